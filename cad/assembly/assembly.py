@@ -158,12 +158,6 @@ def rotor_weight(scanner: Scanner, stack: Hub, bodies: Mapping[str, Inertial]) -
     return weight_of(scanner, rotor.mass_kg, float(z) - stack.horn / 1000, math.hypot(x, y))
 
 
-def off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
-    """Return the error of the rotor's centre of mass across the axis: that of the lidar is undocumented."""
-    lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
-    return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
-
-
 def rotor_moment(assembly: Assembly) -> Array:
     """Return the mass times distance from the axis of all that turns, shape (2,) [g mm]."""
     rotor = rotor_of(assembly.layout.scanner, link_bodies(assembly))

@@ -6,11 +6,8 @@ Constant limits are here, with their reason; limits of products, printer or layo
 from dataclasses import replace
 from typing import NamedTuple
 
-from scanwright.cad.layout.loads import RATED_AT_MM, rated_moment_nm
-from scanwright.cad.layout.names import SERVO
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
-from scanwright.design.scanner import Scanner
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
@@ -208,12 +205,6 @@ def rated(
     if rating is None:
         return note(code, value, unit, subject, f"{what}, unrated by its maker")
     return at_most(code, value, rating, unit, subject, f"{what}{by}", hint=hint)
-
-
-def horn_check(scanner: Scanner, moment_nm: float, what: str, hint: str) -> Finding:
-    """Return the tilt moment on the servo's horn against its rating; `what` and `hint` as for `at_most`."""
-    by = f", rated {scanner.servo.radial_load_n:g} N at {RATED_AT_MM:g} mm" if scanner.servo.radial_load_n else ""
-    return rated("tilt_moment", moment_nm, rated_moment_nm(scanner), "N m", SERVO, what, by, hint)
 
 
 def with_error(value: float, error: float | None) -> str:

@@ -15,7 +15,7 @@ from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, 
 from scanwright.cad.assembly.scenes import tied_at
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.drawings.files import drawing_number
-from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
+from scanwright.cad.files.prices import EACH_USD, ESTIMATED, RECENT, UNSURE, year_of
 from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.tightening import hold_of
@@ -33,6 +33,7 @@ STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of th
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
 WASTE = 0.1  # of the plastic of the parts, more for supports and failed prints
+FILAMENT_USD_PER_KG = (15.0, 35.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,23 +8,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from scanwright.cad.assembly.assembly import (
-    LIDAR_CENTRE_ERROR_MM,
-    Assembly,
-    link_bodies,
-    off_axis_error_m,
-    rotor_of,
-    rotor_weight,
-)
-from scanwright.cad.checks.table import SHOCK_G, at_most, figures, horn_check, note, rated, tidy, with_error
+from scanwright.cad.assembly.assembly import LIDAR_CENTRE_ERROR_MM, Assembly, link_bodies, rotor_of, rotor_weight
+from scanwright.cad.checks.table import SHOCK_G, at_most, figures, note, rated, tidy, with_error
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces, run_out_rad
+from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, Supported
 from scanwright.cad.layout.direct.misalignment import SHARE, contributions, worst_moment_nm
 from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.loads import FAR_MM, Weight, friction_nm, noise_deg, rated_moment_nm
+from scanwright.cad.layout.loads import FAR_MM, RATED_AT_MM, Weight, friction_nm, noise_deg, rated_moment_nm
 from scanwright.cad.layout.names import BEARING, BELT, SERVO, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, keeps_flank
@@ -72,7 +65,7 @@ def _horn(scanner: Scanner, cage: BearingCage | None, weight: Weight, shared: Su
     servo, rating = scanner.servo, rated_moment_nm(scanner)
     if cage is None:
         hint = "support the shaft with a bearing near the hub; none of the catalogue fits it"
-        return horn_check(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}", hint)
+        return _horn_moment(scanner, shared.horn_moment_nm, f"tilt moment on the horn of {servo.name}", hint)
     sums = worst_moment_nm(cage, weight)
     parts = ", ".join(
         f"{each.what} {'' if each.off_mm is None else f'({each.off_mm:.3f} mm) '}{each.moment_nm:.3f}"
@@ -118,14 +111,14 @@ def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float
         at_most("bearing_load", max(upper, lower), limit, "N", BEARING, f"load across {name}, {SHOCK_G:g} g and belt"),
         note("bearing_axial", weight.along_n, "N", BEARING, f"load along {name}, carried by one of the two"),
         tension,
-        horn_check(scanner, pull.horn_nm, on_horn, "choose a servo with a higher radial load"),
+        _horn_moment(scanner, pull.horn_nm, on_horn, "choose a servo with a higher radial load"),
         _belt_angle(scanner, stack, torque),
     ]
 
 
 def _belt_angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Finding:
     """Check the angle between axis and servo encoder: pulleys off their axes, and the belt's stretch."""
-    run_out = run_out_rad(stack, scanner.printer.fit_clearance_mm)
+    run_out = _run_out_rad(stack, scanner.printer.fit_clearance_mm)
     stretch = torque_nm / belt_nm_per_rad(stack)
     error = math.degrees(run_out + stretch)
     limit = noise_deg(scanner)
@@ -149,7 +142,7 @@ def load_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Findi
     """Check torques, backlash and loads; bodies of `link_bodies`."""
     scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
-    error_m = off_axis_error_m(bodies)
+    error_m = _off_axis_error_m(bodies)
     off = "centre of mass off the axis"
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * error_m),
@@ -217,3 +210,21 @@ def _flanks(scanner: Scanner, rotor: Inertial, weight: Weight, error_m: float) -
         grams = 1000 * rotor.mass_kg * weight.off_axis_m / (BALANCE_AT_MM / 1000)
         hint = f"balance it with {grams:.0f} g at {BALANCE_AT_MM:g} mm from the axis, {azimuth} deg from +x"
     return Finding("flanks", severity, SERVO, f"{moment}, {what}", tidy(torque), limit, "N m", hint)
+
+
+def _horn_moment(scanner: Scanner, moment_nm: float, what: str, hint: str) -> Finding:
+    """Return the tilt moment on the servo's horn against its rating; `what` and `hint` as for `at_most`."""
+    by = f", rated {scanner.servo.radial_load_n:g} N at {RATED_AT_MM:g} mm" if scanner.servo.radial_load_n else ""
+    return rated("tilt_moment", moment_nm, rated_moment_nm(scanner), "N m", SERVO, what, by, hint)
+
+
+def _off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
+    """Return the error of the rotor's centre of mass across the axis: that of the lidar is undocumented."""
+    lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
+    return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
+
+
+def _run_out_rad(stack: BeltStack, fit_mm: float) -> float:
+    """Return the amplitude of the angle error, once per turn: each pulley is off its axis by half of its fit."""
+    off = 2 * fit_mm / 4
+    return off / stack.pitch_radius

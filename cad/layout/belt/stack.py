@@ -31,8 +31,6 @@ from scanwright.design.catalogue.products import Bearing, Belt
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import Flange, Rotor
 
-GRUB = SCREWS["M3"]  # of the pulley on the shaft
-GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat
 RING_SCREW = SCREWS["M3"]  # of the ring under the lower bearing, into threads of the shaft: they hold up the lidar
 RING_SCREWS_DEG = (45.0, 135.0)
 PLATE_SCREW = SCREWS["M4"]
@@ -52,7 +50,6 @@ UNDER_HORN_HEAD = 4.0  # of the drive pulley: at least
 SEAT_GAP = 0.2  # the feet carry, not the plate
 INNER_RING = 1.45  # width of a bearing's inner ring that a shoulder may touch
 SEAT_WALL = 5.0  # of the tower
-LIP = 1.5  # of the tower inside the bearings' outer rings
 CHAMBER_GAP = 1.5  # around flange and ring in the tower
 CAPSULE_GAP = 1.5  # between shaft and capsule
 DISC = 10.0  # thickness, of the capsule's holder

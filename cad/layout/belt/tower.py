@@ -28,9 +28,7 @@ from scanwright.design.scanner import Scanner
 DISC_SCREW = SCREWS["M3"]
 DISC_SCREWS = 3
 SCREW_DEPTH = 10.0  # of a radial screw in the disc
-UNDER_HEAD = 3.5  # of the wall
 UNDER_FOOT_NUT = 4.0  # of the foot
-UNDER_EAR_HEAD = 2.5  # of the plate
 HORN_GAP = 1.5  # around the foot of the pulley
 THIN_GAP = 0.5  # the same if the servo's screws are close to it
 

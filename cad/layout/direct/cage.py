@@ -24,18 +24,11 @@ FOOT_RADIUS = 3.0
 UNDER_HEAD = 3.0  # of the plate
 CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
-UNDER_CAGE_HEAD = 3.5  # of a leg
-TRAP_WALL = 3.0  # of the boss outside a nut
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
 TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
 PLUG_PLAY = 1.0  # clearance around a plug in a hole
 PLASTIC_PA = 2.3e9  # modulus of solid PLA, the softest material of the printers
 POISSON = 0.35
-FORK = 6.0
-ARM_GAP = 0.25  # between arm and stator, on the radius
-ARM = 5.0
-ARM_HALF_WIDTH = 10.0
-UNDER_ROOF = 12.0  # from the arms' ends to the ring's top, under a cage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

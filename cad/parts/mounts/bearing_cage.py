@@ -24,8 +24,6 @@ from scanwright.cad.layout.direct.cage import (
     FOOT_RADIUS,
     SCREW_DEPTH,
     SEAT_GAP,
-    TRAP_WALL,
-    UNDER_CAGE_HEAD,
     UNDER_HEAD,
     WINDOW_HALF_WIDTH,
     BearingCage,
@@ -42,6 +40,8 @@ from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
 BELL_GAP = 0.7  # around the bell's foot
+UNDER_CAGE_HEAD = 3.5  # of a leg
+TRAP_WALL = 3.0  # of the boss outside a nut
 
 
 def bell_spec(place: Placement) -> PartSpec | None:

@@ -23,21 +23,13 @@ from scanwright.cad.layout.belt.stack import (
     FOOT_HALF,
     FOOT_HOLE,
     FOOT_SCREW,
-    LIP,
     PLATE_GRIP,
     PLATE_SCREW,
     SHELF,
     TRAVEL,
     BeltStack,
 )
-from scanwright.cad.layout.belt.tower import (
-    DISC_SCREW,
-    SCREW_DEPTH,
-    UNDER_FOOT_NUT,
-    UNDER_HEAD,
-    disc_azimuths,
-    tower_corners,
-)
+from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_FOOT_NUT, disc_azimuths, tower_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
@@ -52,6 +44,8 @@ WINDOW = 10.0  # diameter
 FOOT_CHAMFER = 8.0
 GROOVE = 1.0  # half width of the index groove
 MARKED = 6.0  # half of the edge that it is in
+LIP = 1.5  # of the tower inside the bearings' outer rings
+UNDER_HEAD = 3.5  # of the wall
 
 
 def tower_spec(place: Placement) -> PartSpec | None:

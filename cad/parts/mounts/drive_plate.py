@@ -11,7 +11,7 @@ import cadquery as cq
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
-from scanwright.cad.layout.belt.tower import UNDER_EAR_HEAD, shelf_corners
+from scanwright.cad.layout.belt.tower import shelf_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, upright_axes
@@ -23,6 +23,7 @@ from scanwright.cad.screws import passing_hole, thread_in_part
 from scanwright.cad.solids import building
 
 FOOT_RADIUS = 3.0
+UNDER_HEAD = 2.5  # of the plate
 
 
 def plate_spec(place: Placement) -> PartSpec | None:
@@ -31,7 +32,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
     if p is None or stack is None:
         return None
     words = f"{to_centre(place.scanner.servo)} Put the plate on its front. {screws(SERVO_CASE)}"
-    R, t, heads = stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_EAR_HEAD
+    R, t, heads = stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
     axes = placed_axes(upright_axes(p.holes, heads, -1.0), R, t)
     slots = [(x, y) for x in (-stack.slot_x, stack.slot_x) for _, y in stack.arms_y]
     slot, thread = passing_hole(PLATE_SCREW, printer), thread_in_part(PLATE_SCREW, printer)
@@ -77,7 +78,7 @@ def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(p.opening, seats - 1.0, high + 1.0)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, high + 1.0, x, y))
-            radius, ends = p.screw.driver_radius, (low + UNDER_EAR_HEAD, high + 1.0)
+            radius, ends = p.screw.driver_radius, (low + UNDER_HEAD, high + 1.0)
             cuts.append(
                 head_recess(p, x, y, *ends)
                 if math.hypot(x, y) - radius > p.opening

@@ -16,17 +16,7 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.direct.cage import (
-    ARM,
-    ARM_GAP,
-    ARM_HALF_WIDTH,
-    FOOT_RADIUS,
-    FORK,
-    SEAT_GAP,
-    UNDER_HEAD,
-    UNDER_ROOF,
-    BearingCage,
-)
+from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import box_corners
@@ -46,6 +36,11 @@ RING_STEP = Step(
     "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )
 OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
+ARM_GAP = 0.25  # between arm and stator, on the radius
+ARM = 5.0
+ARM_HALF_WIDTH = 10.0
+UNDER_ROOF = 12.0  # from the arms' ends to the ring's top, under a cage
+PLATE = 6.0
 
 
 def adapter_spec(place: Placement) -> PartSpec | None:
@@ -75,7 +70,7 @@ def _around(servo: Servo, stack: DirectStack, fork: Ears) -> Iterator[Shape]:
     front = stack.horn + fork.front + SEAT_GAP
     outer = max(stack.ring_radius + ARM_GAP + ARM, fork.half_x)
     yield shape_of(box_corners(((-outer, -ARM_HALF_WIDTH, front), (outer, ARM_HALF_WIDTH, stack.ring_top))))
-    yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + FORK))))
+    yield shape_of(box_corners(((-outer, servo.case_min_mm[1], front), (outer, ARM_HALF_WIDTH, front + PLATE))))
 
 
 def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) -> cq.Solid:
@@ -83,7 +78,7 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
     inner = stack.ring_radius + ARM_GAP
     outer, root = inner + ARM, inner - 4.0
     if cage is None:
-        body, top = _fork(stack, ears, outer), stack.horn + ears.front + SEAT_GAP + FORK
+        body, top = _fork(stack, ears, outer), stack.horn + ears.front + SEAT_GAP + PLATE
     else:
         body, top = cage_base(cage), cage.foot
     high_end = stack.ring_bottom + min(30.0, stack.ring_length - (5.0 if cage is None else UNDER_ROOF))
@@ -113,7 +108,7 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
 def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
     """Return the plate on the servo, open at +y."""
     low, seats = stack.horn + p.front + SEAT_GAP, stack.horn + p.seats
-    top = low + FORK
+    top = low + PLATE
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5

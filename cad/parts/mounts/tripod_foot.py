@@ -13,15 +13,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.deck import (
-    FOOT_THICKNESS,
-    OVER_NUTS,
-    TRIPOD_FLOOR,
-    TRIPOD_HEEL,
-    TRIPOD_PROTRUDES,
-    Deck,
-    TripodFoot,
-)
+from scanwright.cad.layout.deck import FOOT_THICKNESS, OVER_NUTS, Deck, TripodFoot
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
 from scanwright.cad.layout.placement import Placement
@@ -29,6 +21,10 @@ from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import TRIPOD_SCREW
 from scanwright.cad.solids import building
 from scanwright.design.left_out import LeftOut
+
+FLOOR = 2.0  # under the tripod's nut: its screw protrudes little
+PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; longer ones fit
+HEEL = 19.0  # half the width of the narrowest plate of a tripod's head: assumed
 
 
 def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
@@ -73,10 +69,10 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         TRIPOD_SCREW,
         placed_axes(upright_axes([(0.0, 0.0)], -p.thickness - DECK_MM, 1.0), R, deck.centre),
         grip_mm=DECK_MM,
-        thread_mm=p.thickness if p.tripod.trap is None else TRIPOD_FLOOR,
+        thread_mm=p.thickness if p.tripod.trap is None else FLOOR,
         thread=p.tripod,
-        protrudes_mm=TRIPOD_PROTRUDES,
-        heel_mm=TRIPOD_HEEL,
+        protrudes_mm=PROTRUDES,
+        heel_mm=HEEL,
     )
 
 
@@ -86,7 +82,7 @@ def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
         plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]
         if p.tripod.trap is not None:
-            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), TRIPOD_FLOOR - p.thickness, 1.0))
+            cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), FLOOR - p.thickness, 1.0))
         for x, y in deck.deck_holes:
             cuts.append(solids.upright(p.mount.hole / 2, -p.thickness - 1.0, 1.0, x, y))
             if p.mount.trap is not None:

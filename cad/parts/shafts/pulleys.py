@@ -18,7 +18,7 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
-from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.stack import BOSS, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
 from scanwright.cad.layout.belt.tower import pulley_foot_radius
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import (
@@ -40,6 +40,8 @@ CHORDS = 4  # of a groove's half circle: within 0.05 mm, below the resolution of
 MOUTH = 0.25  # extra width of a groove at the tips, on each side
 GIVE_MM = 2.0  # movement of a strand in the test of its pre-load
 OFF_AXIS = "more clearance puts the pulley further off its axis than belt_angle of checks.json assumes"
+GRUB = SCREWS["M3"]  # of the pulley on the shaft
+GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat
 
 
 def shaft_pulley_spec(place: Placement) -> PartSpec | None:

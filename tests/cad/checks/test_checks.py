@@ -11,10 +11,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanwright.cad.assembly import assembly as masses
 from scanwright.cad.checks import run
 from scanwright.cad.checks.checks_json import checks_text, failure_lines, read_checks
 from scanwright.cad.checks.clearance import together_check, turning_check
+from scanwright.cad.checks.loads import mechanics
 from scanwright.cad.checks.loads.mechanics import load_checks
 from scanwright.cad.checks.printing import islands_check, islands_of, part_checks, thin_walls
 from scanwright.cad.checks.products import wiring_checks
@@ -252,7 +252,7 @@ def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypa
     assert (flanks.severity, flanks.limit) == ("warning", 0.005)
     assert "the centre of mass of UTM-30LX is undocumented" in flanks.message
     assert "back and forth" in found(0.006)["flanks"].message
-    monkeypatch.setattr(masses, "LIDAR_CENTRE_ERROR_MM", 0.5)
+    monkeypatch.setattr(mechanics, "LIDAR_CENTRE_ERROR_MM", 0.5)
     assert found(0.001)["flanks"].severity == "ok"
 
 
