@@ -112,19 +112,13 @@ def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], 
         front=servo.case_max_mm[2],
         seats=servo.front.z_mm,
         opening=opening,
-        half_x=plate_half_x(servo),
+        half_x=max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.driver_radius + HEAD_WALL),
         screw=screw,
         hole=passing_hole(screw, scanner.printer),
         holes=holes,
         fixing=fixing_of(servo.front),
         thread_mm=servo.front.depth_mm,
     )
-
-
-def plate_half_x(servo: Servo) -> float:
-    """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
-    driver_radius = SCREWS[servo.front.screw].driver_radius
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + driver_radius + HEAD_WALL)
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,7 +118,7 @@ def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float
 
 def _belt_angle(scanner: Scanner, stack: BeltStack, torque_nm: float) -> Finding:
     """Check the angle between axis and servo encoder: pulleys off their axes, and the belt's stretch."""
-    run_out = _run_out_rad(stack, scanner.printer.fit_clearance_mm)
+    run_out = scanner.printer.fit_clearance_mm / 2 / stack.pitch_radius  # each pulley is off by half of its fit
     stretch = torque_nm / belt_nm_per_rad(stack)
     error = math.degrees(run_out + stretch)
     limit = noise_deg(scanner)
@@ -142,7 +142,8 @@ def load_checks(layout: Placement, bodies: Mapping[str, Inertial]) -> list[Findi
     """Check torques, backlash and loads; bodies of `link_bodies`."""
     scanner, stack = layout.scanner, layout.stack
     rotor, weight = rotor_of(scanner, bodies), rotor_weight(scanner, stack, bodies)
-    error_m = _off_axis_error_m(bodies)
+    # across the axis: the centre of mass of the lidar is undocumented
+    error_m = LIDAR_CENTRE_ERROR_MM / 1000 * bodies["laser"].mass_kg / rotor.mass_kg
     off = "centre of mass off the axis"
     return [
         note("centre_of_mass", 1000 * weight.off_axis_m, "mm", "rotor", off, 1000 * error_m),
@@ -216,15 +217,3 @@ def _horn_moment(scanner: Scanner, moment_nm: float, what: str, hint: str) -> Fi
     """Return the tilt moment on the servo's horn against its rating; `what` and `hint` as for `at_most`."""
     by = f", rated {scanner.servo.radial_load_n:g} N at {RATED_AT_MM:g} mm" if scanner.servo.radial_load_n else ""
     return rated("tilt_moment", moment_nm, rated_moment_nm(scanner), "N m", SERVO, what, by, hint)
-
-
-def _off_axis_error_m(bodies: Mapping[str, Inertial]) -> float:
-    """Return the error of the rotor's centre of mass across the axis: that of the lidar is undocumented."""
-    lidar, rot = bodies["laser"].mass_kg, bodies["rot"].mass_kg
-    return LIDAR_CENTRE_ERROR_MM / 1000 * lidar / (lidar + rot)
-
-
-def _run_out_rad(stack: BeltStack, fit_mm: float) -> float:
-    """Return the amplitude of the angle error, once per turn: each pulley is off its axis by half of its fit."""
-    off = 2 * fit_mm / 4
-    return off / stack.pitch_radius
