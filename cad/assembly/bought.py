@@ -16,8 +16,7 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR, mesh_of
 from scanwright.cad.layout import names
-from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.belt.tower import flange_centres
+from scanwright.cad.layout.belt.stack import BeltStack, flange_centres
 from scanwright.cad.layout.cables.fixed import FixedCable
 from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL, RotorLead
 from scanwright.cad.layout.cables.route import Path

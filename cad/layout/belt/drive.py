@@ -17,13 +17,11 @@ from scanwright.cad.layout.belt.stack import (
     FOOT_SCREW,
     PLATE,
     SHELF,
+    THIN_GAP,
+    UNDER_FOOT_NUT,
     BeltStack,
     case_corners,
     drive_corners,
-)
-from scanwright.cad.layout.belt.tower import (
-    THIN_GAP,
-    UNDER_FOOT_NUT,
     plate_of,
     pulley_foot_radius,
     shelf_corners,

@@ -19,17 +19,21 @@ from scanwright.cad.layout.belt.stack import (
     BOSS,
     CASE_GAP,
     DISC,
+    DISC_SCREW,
     FOOT,
     FOOT_HALF,
     FOOT_HOLE,
     FOOT_SCREW,
     PLATE_GRIP,
     PLATE_SCREW,
+    SCREW_DEPTH,
     SHELF,
     TRAVEL,
+    UNDER_FOOT_NUT,
     BeltStack,
+    disc_azimuths,
+    tower_corners,
 )
-from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, UNDER_FOOT_NUT, disc_azimuths, tower_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER

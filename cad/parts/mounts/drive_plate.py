@@ -10,8 +10,7 @@ from functools import partial
 import cadquery as cq
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
-from scanwright.cad.layout.belt.tower import shelf_corners
+from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack, shelf_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, upright_axes

@@ -18,8 +18,7 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
-from scanwright.cad.layout.belt.stack import BOSS, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
-from scanwright.cad.layout.belt.tower import pulley_foot_radius
+from scanwright.cad.layout.belt.stack import BOSS, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack, pulley_foot_radius
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import (
     Joint,

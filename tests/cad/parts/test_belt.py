@@ -26,8 +26,7 @@ from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
 from scanwright.cad.layout.belt.sizing import QUARTERS
-from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
-from scanwright.cad.layout.belt.tower import tower_foot_of
+from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners, tower_foot_of
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
