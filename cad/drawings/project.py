@@ -48,6 +48,12 @@ class Arc:
     end: float
     hidden: bool
 
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """Points on it, close together."""
+        (x, y), turns = self.centre, np.linspace(self.start, self.end, 17).tolist()
+        return [(x + self.radius * math.cos(turn), y + self.radius * math.sin(turn)) for turn in turns]
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:

@@ -26,7 +26,7 @@ from scanwright.cad.drawings.patterns import (
     planes_across,
 )
 from scanwright.cad.drawings.pen import TEXT_MM, Layer, Pen, Point
-from scanwright.cad.drawings.project import Arc, Curve
+from scanwright.cad.drawings.project import Arc
 from scanwright.cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
 NEARLY_MM = 0.2  # an extent that differs less from a radius is that radius, notched
@@ -130,17 +130,8 @@ def _name_centre(pen: Pen, view: View, at: Point) -> None:
     (x, y), right = at, at[0] + CENTRE_GAP_MM
     below = y - 1.0 - TEXT_MM
     choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
-    lines = [[pen.paper(point) for point in _points(curve)] for curve in view.curves]
+    lines = [[pen.paper(point) for point in curve.points] for curve in view.curves]
     free_text(pen, "OPTICAL CENTRE", choices, lines)
-
-
-def _points(curve: Curve) -> list[Point]:
-    """Return points on a curve of a view."""
-    if not isinstance(curve, Arc):
-        return list(curve.points)
-    (x, y), radius = curve.centre, curve.radius
-    turns = [curve.start + (curve.end - curve.start) * k / 16 for k in range(17)]
-    return [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
 
 
 def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) -> None:

@@ -8,7 +8,8 @@ deflated, with the zip format's first date: the output of a compressor depends o
 import io
 import math
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TypeVar
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
@@ -20,6 +21,7 @@ from scanwright.design.scene.parallel_view import view_of
 from scanwright.design.scene.ray_caster import build_scene
 
 Plate = dict[str, TriMesh]
+Thing = TypeVar("Thing")
 
 GAP_MM = 8.0  # between two parts, for a brim on both
 EDGE_MM = 5.0  # of the bed, for clips and skirts
@@ -104,23 +106,21 @@ def plates_of(printed: Mapping[str, TriMesh], bed_mm: tuple[float, float, float]
     """Distribute parts in their print pose over few beds, in rows; a part larger than a bed gets a separate one."""
     sizes = {name: np.ptp(mesh.vertices, axis=0) for name, mesh in printed.items()}
     order = sorted(printed, key=lambda name: (-round(float(sizes[name][1]), 3), -round(float(sizes[name][0]), 3), name))
-    rows: list[tuple[float, list[str]]] = []  # width left, and its parts
-    for name in order:
-        wide = float(sizes[name][0]) + GAP_MM
-        fitting = next((i for i, (left, _) in enumerate(rows) if left >= wide), None)
-        if fitting is None:
-            rows.append((bed_mm[0] - 2 * EDGE_MM + GAP_MM - wide, [name]))
-        else:
-            rows[fitting] = rows[fitting][0] - wide, [*rows[fitting][1], name]
-    plates: list[tuple[float, list[list[str]]]] = []
-    for _, names in rows:
-        deep = float(max(sizes[name][1] for name in names)) + GAP_MM
-        fitting = next((i for i, (left, _) in enumerate(plates) if left >= deep), None)
-        if fitting is None:
-            plates.append((bed_mm[1] - 2 * EDGE_MM + GAP_MM - deep, [names]))
-        else:
-            plates[fitting] = plates[fitting][0] - deep, [*plates[fitting][1], names]
-    return [_laid(printed, sizes, names[::-1], bed_mm) for _, names in plates]
+    across, deep = (edge - 2 * EDGE_MM + GAP_MM for edge in bed_mm[:2])
+    rows = _first_fit(((float(sizes[name][0]) + GAP_MM, name) for name in order), across)
+    depths = (float(max(sizes[name][1] for name in row)) + GAP_MM for row in rows)
+    plates = _first_fit(zip(depths, rows, strict=True), deep)
+    return [_laid(printed, sizes, rows[::-1], bed_mm) for rows in plates]
+
+
+def _first_fit(things: Iterable[tuple[float, Thing]], space: float) -> list[list[Thing]]:
+    """Distribute things by their sizes, each over the first of equal spaces that has place for it."""
+    filled: list[tuple[float, list[Thing]]] = []  # what is left of a space, and what is in it
+    for size, thing in things:
+        i = next((i for i, (left, _) in enumerate(filled) if left >= size), len(filled))
+        left, inside = filled[i] if i < len(filled) else (space, [])
+        filled[i : i + 1] = [(left - size, [*inside, thing])]
+    return [inside for _, inside in filled]
 
 
 def plate_files(
