@@ -16,11 +16,7 @@ CHORD_ANGLE = 0.3  # rad
 
 
 def draft_linkage(p: AlignmentLinkage) -> TriMesh:
-    """Return the linkage, rotation frame.
-
-    Raises:
-        BuildError: the kernel fails at one of its shapes.
-    """
+    """Return the linkage, rotation frame."""
     shapes = shapes_of(p)
     free_space = _together(shapes.free_space)
     body = (_solid(shapes.plate) + _solid(shapes.neck)) - free_space - _together(shapes.fins)

@@ -31,11 +31,7 @@ Entity = tuple[str, tuple[int, ...]]
 
 
 def step_text(assembly: cq.Assembly, title: str) -> str:
-    """Return the canonical STEP text of an assembly of named, coloured parts [mm]; `title` enters the header.
-
-    Raises:
-        BuildError: the kernel wrote no file.
-    """
+    """Return the canonical STEP text of an assembly of named, coloured parts [mm]; `title` enters the header."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "part.step"
         assembly.export(str(path), exportType="STEP")

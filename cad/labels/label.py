@@ -5,7 +5,7 @@ flat face with enough area and a wall behind it, preferably one that can be read
 touches nothing there. A small part gets the configuration alone or no label.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -16,15 +16,14 @@ import shapely
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry.holes import Piercing
 from scanwright.cad.geometry.mesh import TriMesh
-from scanwright.cad.labels.engrave import Groove, engrave, groove_of
-from scanwright.cad.labels.flats import Flat, flat_at, flats_of
+from scanwright.cad.labels.engrave import Flat, Groove, engrave, flat_at, flats_of, groove_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.visibility import FreeDistance, free_distance
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
+from scanwright.design.scene import ray_caster
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 MARGIN = 1.5  # of a face around its label
@@ -40,6 +39,36 @@ LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
 FRONT_INSET = 10.0  # of its middle from the edge
 TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (0, 1)))  # lengthwise first
+OFF = 0.05  # from the face to the start of the rays
+DECK_HALF = 2000.0
+DECK_BELOW = 0.2  # of its face in this scene: a foot that lies on it then touches it
+
+FreeDistance = Callable[[Flat, Array], Array]
+"""Distances from points of a face, shape (n, 2), to the next body: shape (n,), 0 if it touches, inf if none."""
+
+
+def free_distance(assembly: Assembly) -> FreeDistance:
+    """Return a measurement by rays against all bodies of the assembly and its deck."""
+    corners = [mesh.vertices[mesh.faces] for mesh in assembly.meshes().values()]
+    bodies = ray_caster.build_scene(np.concatenate([_deck(assembly), *corners]) / 1000)
+
+    def measured(flat: Flat, points: Array) -> Array:
+        normal = flat.frame[:, 2]
+        starts = (flat.at(points) + OFF * normal) / 1000
+        hits = ray_caster.cast(bodies, starts, np.broadcast_to(normal, starts.shape))
+        # a body on the face contains the start of the ray, which then meets its surface from within
+        within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ normal > 0)
+        return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
+
+    return measured
+
+
+def _deck(assembly: Assembly) -> Array:
+    """Return the deck as two triangles, shape (2, 3, 3)."""
+    axes, centre = assembly.layout.deck.rotation(), np.array(assembly.layout.deck.centre)
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * DECK_HALF
+    corners = centre - DECK_BELOW * axes[:, 2] + square @ axes[:, :2].T
+    return corners[[[0, 1, 2], [0, 2, 3]]]
 
 
 @dataclass(slots=True)
@@ -82,9 +111,10 @@ class Ground:
         return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
-def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
+def labelled_parts(assembly: Assembly) -> Labelled:
     """Engrave every printed part that has enough area."""
-    before, done, groove = free_distance(assembly), Labelled(), groove_of(scanner.printer)
+    layout, before, done = assembly.layout, free_distance(assembly), Labelled()
+    scanner, groove = layout.scanner, groove_of(layout.scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -96,7 +126,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
                 why = "a hole of the seat is in its place; the V in the edge also marks the front"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
-        label = label_on(ground, label_texts(scanner, part, config_hash), before)
+        label = label_on(ground, label_texts(scanner, part, layout.digest), before)
         if label is None:
             why = "no free flat face is large enough"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))

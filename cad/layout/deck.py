@@ -12,14 +12,12 @@ from itertools import product
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from scanwright.cad import outlines
 from scanwright.cad.layout.drive import DriveLayout, Mounted
 from scanwright.cad.layout.envelope import box_corners
-from scanwright.cad.layout.joints import DECK_MM, Joint, triple, upright_axes
-from scanwright.cad.layout.modules.tripod_foot import TripodFoot, tripod_foot_of
+from scanwright.cad.layout.joints import DECK_MM, Joint, shank_mm, triple, upright_axes
 from scanwright.cad.layout.names import BASE_MOUNT, DECK
 from scanwright.cad.layout.tie_seat import SLOT_ACROSS, SLOT_ALONG, SLOT_WALL, TieSeat
-from scanwright.cad.screws import KEYS_MM, SCREWS, Screw
+from scanwright.cad.screws import KEYS_MM, SCREWS, TRIPOD_SCREW, Screw, Thread, thread_in_part
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.deck_holes import Circle, Rectangle
@@ -31,18 +29,39 @@ TIES_HALF = 5.5  # half of the distance of two slots of the foot: two leads fit 
 FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
 BACK_THICKNESS = 8.0
-UNDER_MOUNT_HEAD = 5.0  # of the mount, to its load
 BACK_MARGIN = 5.0  # of the back plate around the rear holes, at least
 RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
 RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
 USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount, unless the task states some
 PAD_HALF = 26.0  # of the strut on the foot
-STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 HOLE_MARGIN = 10.0  # of the foot around a hole
 FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)  # along world x and y
 FOOT_DROPS = tuple(6.0 * k for k in range(11))  # from the back plate, beyond the least height
 FREE = 5.0  # above the foot, for everything except the mount
 SWEEP_MARGIN = 3.0  # around the turning lidar
+LEAST_TRIPOD = 8.0  # thickness: the nut and a floor under it
+OVER_NUTS = 2.8  # of the mount's screws
+
+
+@dataclass(frozen=True, slots=True)
+class TripodFoot:
+    """The plate under the mount's foot; `mount` and `tripod` are the threads of their screws.
+
+    The nut of the tripod's screw is in a pocket that is open towards the mount, on a thin floor that tripod and nut
+    clamp: no thread is in plastic.
+    """
+
+    thickness: float
+    mount: Thread
+    tripod: Thread
+
+
+def tripod_foot_of(screw: Screw, printer: Printer, above: float) -> TripodFoot:
+    """Return the plate below a thickness of the mount, so thick that no screw of the mount protrudes."""
+    longest = shank_mm(screw, above, "trap", OVER_NUTS)
+    mount = thread_in_part(screw, printer, carries=True)
+    thickness = max(LEAST_TRIPOD, longest - above) if mount.trap is not None else LEAST_TRIPOD
+    return TripodFoot(thickness, mount, thread_in_part(TRIPOD_SCREW, printer, carries=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,21 +158,6 @@ def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> b
     across = np.linspace(-1.0, 1.0, 9) * (seat.half + SLOT_ACROSS)
     slots = seat.points(np.array([seat.first, seat.last]), across, np.zeros(1))[:, None, :2]
     return bool((np.linalg.norm(slots - np.array(deck_holes), axis=2) < FROM_DECK_SCREW).any())
-
-
-def strut_corners(deck: Deck) -> Array:
-    """Return corners of back plate and a pad in the foot, shape (n, 3): the strut is their hull behind the plate.
-
-    No facet coincides with plate or foot.
-    """
-    x, y = deck.back_half
-    _, cy, cz = deck.back_centre
-    plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
-    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
-    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
-    for z in (0.8, FOOT_THICKNESS - 0.9):
-        layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
-    return np.concatenate(layers)
 
 
 def rail_wall(printer: Printer) -> float:

@@ -102,14 +102,7 @@ def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_
 
 
 def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: ShaftMetal = ALUMINIUM) -> Supported:
-    """Share the weight between horn and bearing: the deflections of shaft and cage are equal at the bearing.
-
-    Args:
-        weight: of all that turns.
-        stack: with a bearing.
-        cage_n_per_m: sideways stiffness of the cage at the bearing.
-        metal: of the shaft.
-    """
+    """Share the weight of all that turns: the deflections of shaft and cage are equal at the bearing."""
     b = (stack.bearing_middle - stack.horn) / 1000
     waist = metal.waist * stack.waist_diameter
     above_horn, thick = stack.slices(1000 * b, waist)

@@ -3,8 +3,7 @@
 import math
 from dataclasses import replace
 
-from scanwright.cad.layout.direct.adapter import fork_holes
-from scanwright.cad.layout.direct.cage import ears_of
+from scanwright.cad.layout.direct.cage import ears_of, fork_holes
 from scanwright.cad.layout.direct.cup import cup_stack
 from scanwright.cad.layout.direct.frame import needs_frame
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears

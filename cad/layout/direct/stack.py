@@ -179,11 +179,9 @@ class DirectStack(Hub):
         return np.where(np.asarray(above_horn) < self.horn_grip, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
-        """Return middles and thicknesses of slices of the shaft above the horn; none crosses an edge of it.
+        """Return middles and thicknesses of slices of a length of shaft above the horn; none crosses an edge of it.
 
-        Args:
-            length: of the piece above the horn.
-            waist_diameter: of its waist, in the metal used.
+        Its waist has a diameter in the metal used.
         """
         waist = self.collar_height + self.waist_length
         slope = (self.shaft_diameter - waist_diameter) / 2

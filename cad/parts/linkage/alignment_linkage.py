@@ -139,11 +139,7 @@ class Shapes:
 
 
 def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
-    """Return the shapes; `attempt` turns the neck a little, and widens the paths of drivers.
-
-    Raises:
-        BuildError: the kernel fails at one.
-    """
+    """Return the shapes; `attempt` turns the neck a little, and widens the paths of drivers."""
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", _tilt(p)):
         laser = solids.location(p.stack.R())
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]

@@ -16,17 +16,7 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.deck import (
-    BACK_THICKNESS,
-    FOOT_THICKNESS,
-    PLUG_GAP,
-    RAIL_INSET,
-    STRUT_BEHIND,
-    UNDER_MOUNT_HEAD,
-    Deck,
-    rail_wall,
-    strut_corners,
-)
+from scanwright.cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, RAIL_INSET, Deck, rail_wall
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
@@ -36,6 +26,7 @@ from scanwright.cad.parts.linkage.linkage_hub import tie_slots
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building
+from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.left_out import LeftOut
 
@@ -67,6 +58,8 @@ SEAT_GAP = 0.2  # the feet carry, not the rails
 
 
 STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_STEP}
+UNDER_MOUNT_HEAD = 5.0  # of the mount, to its load
+STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
 
 
 def mount_spec(place: Placement) -> PartSpec | LeftOut:
@@ -112,7 +105,7 @@ def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
         middle, along = side * abs(mounted.holes[0][0]), y - RAIL_INSET
         low, high = (middle - RAIL_HALF, cy - along, cz), (middle + RAIL_HALF, cy + along, cz + PLUG_GAP)
         yield shape_of(box_corners((low, high)))
-    strut = shape_of(strut_corners(deck))
+    strut = shape_of(_strut_corners(deck))
     front = np.array([[0.0, 0.0, 1.0, STRUT_BEHIND - cz]])
     yield replace(strut, planes=np.concatenate([strut.planes, front]))
     outline = outlines.octagon(*deck.foot)
@@ -154,7 +147,7 @@ def _back_plate(deck: Deck) -> cq.Solid:
 def _strut(deck: Deck) -> cq.Shape:
     """Return the hull of back plate and a pad in the foot, behind the front of the back plate."""
     high = deck.back_centre[2] - STRUT_BEHIND
-    return solids.hull(strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
+    return solids.hull(_strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
 
 
 def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Solid:
@@ -164,3 +157,18 @@ def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Sol
     half = max(RAIL_HALF_WIDTH, mounted.screw.driver_radius + rail_wall(printer))
     low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))
+
+
+def _strut_corners(deck: Deck) -> Array:
+    """Return corners of back plate and a pad in the foot, shape (n, 3): the strut is their hull behind the plate.
+
+    No facet coincides with plate or foot.
+    """
+    x, y = deck.back_half
+    _, cy, cz = deck.back_centre
+    plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
+    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
+    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
+    for z in (0.8, FOOT_THICKNESS - 0.9):
+        layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
+    return np.concatenate(layers)

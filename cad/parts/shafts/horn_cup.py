@@ -16,9 +16,8 @@ from scanwright.cad.layout.joints import horn_centres, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, SERVO_HORN
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import BEFORE_NUT, AlignmentLinkage
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, to_centre
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, spigot_in_hub, to_centre
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
-from scanwright.cad.parts.tolerances import OnSheet, spigot_in_hub
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -46,7 +45,7 @@ def cup_spec(place: Placement) -> PartSpec | None:
         turns=True,
         make=partial(horn_cup, p, stack, scanner.servo, scanner.printer),
         step=Step("Cup on the horn", words, "the index groove is over the middle of the +Y face"),
-        sheet=OnSheet((spigot_in_hub(stack.shaft_diameter, p.fit),)),
+        fits=(spigot_in_hub(stack.shaft_diameter, p.fit),),
         shaped_by=HORN,
         joints=(on_horn(scanner.servo, stack, HORN_CUP),),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the cup", LINKAGE_WORDS, SEATED_ON_RIM)},

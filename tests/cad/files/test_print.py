@@ -15,10 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
 from scanwright.cad.assembly.print_settings import print_words, slicer_settings
-from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.plates import threemf_bytes
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
-from scanwright.cad.labels.glyphs import GLYPHS, text_width
+from scanwright.cad.labels.lettering import GLYPHS, text_width
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Printer
 
@@ -113,13 +113,13 @@ def test_the_longer_side_lies_along_x_and_decides_whether_it_fits():
 
 
 def test_every_printed_part_has_a_file_that_a_strict_reader_takes(made):
-    printed = {file for file in made.exports.files if file.startswith("print/") and "plate" not in file}
+    printed = {f"print/{file.name}" for file in (made.folder / "print").glob("*.3mf") if "plate" not in file.name}
     names = {part.name for part in made.result.parts} - {"servo_shaft", "journal_sleeve", "counterweight"} | {
         "fit_coupon"
     }
     assert printed == {f"print/{name}.3mf" for name in names}
     assert ("print/servo_shaft.3mf", "of metal: made after its STEP file") in {
-        (entry.what, entry.why) for entry in made.exports.left_out
+        (entry.what, entry.why) for entry in made.exports[1]
     }
     for file in printed:
         model = get_wrapper().CreateModel()

@@ -11,11 +11,9 @@ from scanners import digest_of
 from scanwright.cad import solids
 from scanwright.cad.geometry.holes import Piercing
 from scanwright.cad.geometry.mesh import checked_mesh
-from scanwright.cad.labels.engrave import engrave, groove_of
-from scanwright.cad.labels.flats import flat_at, flats_of
-from scanwright.cad.labels.glyphs import letters, text_width
-from scanwright.cad.labels.label import DIGITS, Ground, engraved, label_on, label_texts
-from scanwright.cad.labels.visibility import free_distance
+from scanwright.cad.labels.engrave import engrave, flat_at, flats_of, groove_of
+from scanwright.cad.labels.label import DIGITS, Ground, engraved, free_distance, label_on, label_texts
+from scanwright.cad.labels.lettering import letters, text_width
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.solids import box, upright
 from scanwright.design.errors import BuildError

@@ -67,7 +67,7 @@ def what_is_behind(assembly, part, hole, screw, core, rounds, printer):
     if core:  # a blind one, or one before another part's hole, is the thread of that part's screw
         if partner is not None or not hole.through or not ends_in_bore(hole, rounds[part]):
             return None
-        shaft = next(name for name in assembly.made if name != part and name in assembly.turning_parts())
+        shaft = next(name for name in assembly.made if name != part and name in assembly.parts_in("rot"))
         return Behind(shaft, "grub", 0.0, 0)
     if partner is None:
         layout = assembly.layout

@@ -9,7 +9,7 @@ from scanners import TILTED, bare_linkage, scanner_at
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.assembly.scenes import scenes_of
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.holes import rounds_of
@@ -69,14 +69,14 @@ def test_a_nut_drops_into_a_boss_before_the_ring_comes(nutted):
 
 
 def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
-    scanner, assembly, _, joints = nutted
+    _, assembly, _, joints = nutted
     trapped = {(joint.part, joint.onto): joint for joint in joints if joint.traps}
     cage = trapped[("bearing_cage", "slip_ring_adapter")]
     assert len(trapped) == 1 and (cage.count, cage.fixing) == (4, "trap")
     assert cage.length_mm >= cage.grip_mm + 3.0 + HEIGHT - 0.1  # the leg, the wall, the nut
-    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
+    items = items_of(assembly, dict.fromkeys(assembly.made, 1.0))
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 4
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
+    text = instructions_text(assembly, scenes_of(assembly), [])
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their pockets" in text
     assert without_traps(PRINTER, joints) == []
     core = thread_in_part(M3, PRINTER, nut_fits=False)

@@ -7,8 +7,7 @@ from OCP.gp import gp_Pnt
 from OCP.TopAbs import TopAbs_State
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
-from scanwright.cad.assembly.cable_instructions import tied_at
-from scanwright.cad.assembly.steps import steps_of
+from scanwright.cad.assembly.scenes import steps_of, tied_at
 from scanwright.cad.layout.cables.leads import tied_mm
 from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
