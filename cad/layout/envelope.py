@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_HEIGHT, Axis, Hub
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.screws import SCREWS, Screw
 from scanwright.design.arrays import Array
@@ -298,18 +298,25 @@ def exact(R: Array) -> Array:
 
 
 def hub_height(
-    envelope: Envelope, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None
+    envelope: Envelope,
+    R: Array,
+    hub_radius: float,
+    rims: Sequence[tuple[float, float]] = (),
+    sub_plate: Axis | None = None,
 ) -> float:
-    """Return h, rounded up to 0.25 mm: the hub's top is at z = -h."""
+    """Return h, rounded up to 0.25 mm: the hub's top is at z = -h.
+
+    `rims` are radius and depth below the hub's top of round bodies that hide beams anyway: ring, seat of a bearing.
+    """
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
     plate = float((box_corners(envelope.plate(sub_plate)) @ R[2]).min())
     heads = float((box_corners(envelope.under(sub_plate)) @ R[2]).min())
     heights = [1.0 - z for z in lowest]
     heights.append(1.0 - heads - HUB_HEIGHT)
     heights.append(1.0 - plate - (HUB_HEIGHT - CROSS_ABOVE_BOTTOM - 3.0))  # a driver reaches the cross screws
-    if ring_radius > hub_radius:
-        # the hub stays inside the cone that the ring hides anyway
-        heights.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
+    # the hub stays inside one of their cones
+    cones = [hub_radius * depth / (radius - hub_radius) for radius, depth in rims if radius > hub_radius]
+    heights.append(min(cones, default=0.0))
     tilt = math.degrees(math.acos(min(1.0, R[2, 2])))
     low, high = H_FLOOR
     heights.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))

@@ -17,6 +17,7 @@ HUB_HEIGHT = 14.0
 HUB_WALL = 12.0  # around the spigot: between the heads of the cross screws and the shaft
 CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
 NECK_ON_RIM = 1.5  # between the neck and the edge of a cup's rim
+HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
 HUB_GAP = 10.0  # least height between a ring and the hub
 BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
 SPIGOT = 11.0  # length of the shaft inside the hub
@@ -52,7 +53,8 @@ class Hub(ABC):
     @property
     def hub_radius(self) -> float:
         """Radius of the linkage's hub."""
-        return self.shaft_diameter / 2 + (CUP_HUB_WALL if self.cup_bore > 0 else HUB_WALL)
+        on_sleeve = 0.0 if self.bearing is None else self.bearing.bore_mm / 2 + HUB_STEP
+        return max(self.shaft_diameter / 2 + (CUP_HUB_WALL if self.cup_bore > 0 else HUB_WALL), on_sleeve)
 
     @property
     def neck_radius(self) -> float:

@@ -41,7 +41,7 @@ def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
         grip = _grip(servo, max(floor, foot_height + max(FLOOR_ON_FOOT, wall)))
         floor = max(grip, foot_height + flange - foot)  # a cone of 45 deg needs no support
     return DirectStack(
-        h=hub_height(envelope, R, hub_radius, 0.0),
+        h=hub_height(envelope, R, hub_radius),
         R_rot_laser=rows_of(R),
         ring_length=0.0,
         ring_radius=0.0,

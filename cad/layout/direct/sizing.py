@@ -11,7 +11,7 @@ from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import Envelope, hub_height, lidar_pose, rows_of, sub_plate_of
-from scanwright.cad.layout.hub import HUB_WALL
+from scanwright.cad.layout.hub import HUB_GAP, HUB_HEIGHT, HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -37,8 +37,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
     R = lidar_pose(scanner)
     stack = _without_sub_plate(scanner, envelope, R)
     if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
-        h = hub_height(envelope, R, stack.hub_radius, stack.ring_radius, axis)
-        stack = replace(stack, h=h, sub_plate=axis)
+        stack = replace(stack, h=hub_height(envelope, R, stack.hub_radius, stack.rims, axis), sub_plate=axis)
     if stack.bearing is None:
         return stack, None
     ears = ears_of(scanner, stack)
@@ -54,7 +53,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     alone = DirectStack(
-        h=hub_height(envelope, R, shaft / 2 + HUB_WALL, radius),
+        h=hub_height(envelope, R, shaft / 2 + HUB_WALL, [(radius, HUB_HEIGHT + HUB_GAP)]),
         R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,
@@ -82,7 +81,10 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         except BuildError:
             ears_of(scanner, alone)  # its error comes first: no other ring corrects it
             raise
-    return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
+    if bearing is None:
+        return cup or alone
+    stack = replace(alone, bearing=bearing)
+    return replace(stack, h=hub_height(envelope, R, stack.hub_radius, stack.rims))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

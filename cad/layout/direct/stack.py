@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.hub import HUB_GAP, Hub
+from scanwright.cad.layout.hub import HUB_GAP, HUB_HEIGHT, Hub
 from scanwright.cad.layout.names import HORN_CUP, SERVO_SHAFT
 from scanwright.design.arrays import Array
 
@@ -120,6 +120,14 @@ class DirectStack(Hub):
         if self.bearing is None:
             return self.cage_seat
         return self.cage_seat - CAGE_LIP - (self.cage_inner - self.bearing.outer_mm / 2 + CAGE_LIP)
+
+    @property
+    def rims(self) -> list[tuple[float, float]]:
+        """Radius and depth below the hub's top of the ring, or of seat and wall of the cage around it."""
+        if self.bearing is None:
+            return [(self.ring_radius, HUB_HEIGHT + HUB_GAP)]
+        seat = self.bearing.outer_mm / 2 + CAGE_SEAT_WALL
+        return [(seat, -self.cage_top - self.h), (self.cage_outer, -self.cage_roof - self.h)]
 
     @property
     def leads_low(self) -> float:

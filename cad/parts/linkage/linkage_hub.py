@@ -24,7 +24,7 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
     stack = p.stack
     hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
     if p.ear is not None:
-        hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
+        hub = hub.fuse(_ear(p.ear, (stack.shaft_diameter / 2 + stack.hub_radius) / 2))
     if p.hub_tie is not None:
         hub = hub.fuse(tie_lug(p.hub_tie))
     return hub
