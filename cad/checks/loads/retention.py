@@ -96,7 +96,7 @@ def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str
     force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
     shaft, cage, brace = assembly.layout.drive.shaft, assembly.layout.drive.of(BearingCage), None
     if cage is not None and (shaft in hanging) != (BEARING_CAGE in hanging):
-        at, carried_kg = _borne(scanner, assembly, cage)
+        at, carried_kg = _borne(assembly, cage)
         brace = at, (-carried_kg if shaft in hanging else carried_kg) / body.mass_kg
     pull, push = worst_shares(joint, body.centre_m, brace)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
@@ -132,13 +132,13 @@ def together_of(assembly: Assembly, names: frozenset[str]) -> Inertial:
     return inertia.together(bodies)
 
 
-def _borne(scanner: Scanner, assembly: Assembly, cage: BearingCage) -> tuple[Array, float]:
+def _borne(assembly: Assembly, cage: BearingCage) -> tuple[Array, float]:
     """Return the middle of the bearing [m], shape (3,), and the mass [kg] that it carries across the axis."""
     stack = cage.stack
     horn = next(each for each in assembly.layout.joints if (each.part, each.onto) == (stack.shaft, SERVO_HORN))
-    rotor = together_of(scanner, assembly, hanging_on(assembly, horn))
+    rotor = together_of(assembly, hanging_on(assembly, horn))
     across = Weight(rotor.mass_kg, 0.0, float(rotor.centre_m[2]) - stack.horn / 1000, 0.0)
-    carried = share_weight(scanner, stack, cage, across).bearing_force_n
+    carried = share_weight(assembly.layout.scanner, stack, cage, across).bearing_force_n
     return np.array([0.0, 0.0, stack.bearing_middle / 1000]), carried
 
 

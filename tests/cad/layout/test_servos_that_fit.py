@@ -10,7 +10,7 @@ import pytest
 from quick_tests import samples
 
 from benchmarks.cad.combinations import screws_without_a_hole
-from scanwright.cad.assembly.bought_shapes import servo_case, servo_horn
+from scanwright.cad.assembly.bought import servo_case, servo_horn
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
 from scanwright.cad.checks.loads.retention import retention_checks, worst_shares
