@@ -132,7 +132,7 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
         if joint.fixing in ("nut", "deck") or joint.traps:
             nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
         if joint.washer_mm is not None:
-            washers[f"ISO 7093 {joint.screw.name}"] += joint.count
+            washers[f"ISO {7093 if joint.screw.nominal >= 3 else 7089} {joint.screw.name}"] += joint.count
         if joint.inserts:
             inserts[joint.screw.name] += joint.count
     for number, used in sorted(screws.items()):

@@ -14,12 +14,22 @@ import numpy as np
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.masses import lidar_body
 from scanwright.cad.checks.limits import at_least, tidy
-from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G
+from scanwright.cad.checks.table import SHOCK_G
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TRIPOD
-from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.cad.layout.tightening import (
+    ALUMINIUM,
+    BOUGHT,
+    LEAST_MARGIN,
+    MOULDED,
+    PRINTED,
+    STEEL,
+    Hold,
+    Material,
+    hold_of,
+)
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
