@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import Box, around_axis, box_corners
 from scanwright.cad.layout.placement import Placement
@@ -63,7 +63,7 @@ class RotorSpace:
         """Return whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
-        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + apart)
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > self.deck.foot_mm + apart)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
         """Return whether a lead at points would meet a beam; both turn together."""

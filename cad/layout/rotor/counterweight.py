@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scanwright.cad.layout.deck import FOOT_THICKNESS, FREE, Deck
+from scanwright.cad.layout.deck import FREE, Deck
 from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
@@ -179,7 +179,7 @@ class _FreeSpace:
         if math.hypot(bar.end, half) > self.drive.envelope.radius(stack.sub_plate):
             return "would extend beyond the lidar"
         rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
-        if _height_over(self.deck, rims) < FOOT_THICKNESS + FREE / 2:
+        if _height_over(self.deck, rims) < self.deck.foot_mm + FREE / 2:
             return "would be too near to the deck"
         if not self.drive.bears(bar.mass_g, bar.ear.high + bar.section[1] / 2):
             return f"would be too heavy for the horn of {scanner.servo.name} alone"

@@ -9,7 +9,6 @@ from scanwright.cad import outlines
 from scanwright.cad.layout.envelope import (
     BODY_GAP,
     EAR_SCREW,
-    PLATE_MM,
     Box,
     Envelope,
     SideWall,
@@ -125,7 +124,7 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         seat=-lidar.optical_height_mm,
         top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else sub_plate_mm(lidar)),
         plate=plate_mm(lidar, stack.sub_plate),
-        neck_share=max(NECK_SHARE, load_share(lidar) ** 0.25),
+        neck_share=_neck_share(lidar, stack),
         half_x=half_x,
         half_y=half_y,
         chamfer=chamfer,
@@ -146,6 +145,12 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         cross_azimuths=_cross_azimuths(stack.R()[:, 2]),
         cross_thread=thread_in_part(stack.cross_screw.screw, printer, carries=True) if stack.cup_bore > 0 else None,
     )
+
+
+def _neck_share(lidar: Lidar, stack: Hub) -> float:
+    """Return the width of the neck at the plate over that of the plate: by the load, in full below a lying plate."""
+    normal, light = stack.R()[:, 2], max(NECK_SHARE, load_share(lidar) ** 0.25)
+    return light + (1 - light) * math.hypot(normal[0], normal[1]) ** 4
 
 
 def _free_corner(lidar: Lidar) -> float:
@@ -170,21 +175,20 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     outline = outlines.octagon(share * p.half_x - 0.5, share * p.half_y - 0.5, share * p.chamfer)
     for z in (p.top - 0.2, p.top - p.plate + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
-    layers.append(_foot(p, np.concatenate(layers[2:])))
+    layers.append(_foot(np.concatenate(layers[2:]), stack))
     return np.concatenate(layers)
 
 
-def _foot(p: AlignmentLinkage, plate: Array) -> Array:
+def _foot(plate: Array, stack: Hub) -> Array:
     """Return the lower half of the plate's corners, moved down and back: it thickens the neck of a lying plate."""
-    stack, share = p.stack, p.plate / PLATE_MM[1]
     lower = plate[plate[:, 2] < plate[:, 2].mean() - 1e-6]
     if len(lower) == 0:
         return plate
     normal = stack.R()[:, 2]
     lying = math.hypot(normal[0], normal[1]) ** 2
     free = max(0.0, float(lower[:, 2].min()) - stack.shoulder - 2.0)
-    heel = lower - [0.0, 0.0, min(share * HEEL * lying, free)]
-    return np.concatenate([heel, lower - min(share * BACK * lying, free / max(normal[2], 1e-6)) * normal])
+    heel = lower - [0.0, 0.0, min(HEEL * lying, free)]
+    return np.concatenate([heel, lower - min(BACK * lying, free / max(normal[2], 1e-6)) * normal])
 
 
 def _grown(box: Box) -> Box:
