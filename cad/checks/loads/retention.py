@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly, lidar_body
-from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G, at_least, tidy
+from scanwright.cad.checks.table import SHOCK_G, at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
@@ -30,7 +30,17 @@ from scanwright.cad.layout.names import (
     SERVO_OUTPUT,
     TRIPOD,
 )
-from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.cad.layout.tightening import (
+    ALUMINIUM,
+    BOUGHT,
+    LEAST_MARGIN,
+    MOULDED,
+    PRINTED,
+    STEEL,
+    Hold,
+    Material,
+    hold_of,
+)
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
