@@ -61,7 +61,7 @@ def test_a_bearing_takes_load_off_the_horn_and_gives_it_to_its_cage(scanner_and_
         return
 
     def margins():
-        return {c.subject: c.value for c in retention_checks(scanner, assembly) if c.code == "retention"}
+        return {c.subject: c.value for c in retention_checks(assembly) if c.code == "retention"}
 
     shared = margins()
     monkeypatch.setattr(room, "_borne", lambda *_: (np.zeros(3), 0.0))
