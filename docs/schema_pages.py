@@ -46,7 +46,7 @@ def write_schema_pages(folder: Path) -> None:
 
 def _write_sketches(folder: Path) -> None:
     """Write devices.md with a sketch of every product that has dimensions."""
-    from scanwright.cad.drawings.devices.sketch import sketch_svg
+    from scanwright.cad.drawings.sketch import sketch_svg
     from scanwright.design.catalogue.catalogue import load_catalogue
     from scanwright.design.catalogue.products import Belt, Multibeam, Printer
 

@@ -22,17 +22,14 @@ from pathlib import Path
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies, rotor_of
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies, rotor_of
-from scanwright.cad.checks.loads.deflection import LEAST_ERROR
-from scanwright.cad.checks.loads.mount import carried
+from scanwright.cad.checks.loads.deflection import LEAST_ERROR, carried
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
-from scanwright.cad.statics.mount_sag import mount_sag
-from scanwright.cad.statics.sag import POISSON, linkage_sag
+from scanwright.cad.statics.sag import POISSON, linkage_sag, mount_sag
 from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, Rz
@@ -168,7 +165,7 @@ def linkage_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Comp
     x, y, z = np.moveaxis(corners @ R, 2, 0)  # laser frame
     on_seat = (abs(z - linkage.seat) < 0.01) & (abs(x) < linkage.half_x) & (abs(y) < linkage.half_y)
     seat = body.middles(on_seat.all(axis=1))
-    lidar = link_bodies(scanner, assembly)["laser"]
+    lidar = link_bodies(assembly)["laser"]
     material = 1000 * printer.modulus_gpa, printer.density_g_cm3
     half = np.array([linkage.half_x, linkage.half_y, linkage.seat])
     own = linkage_sag(stack, [assembly.mesh(name) for name in names], half, lidar, *material)
@@ -194,7 +191,7 @@ def mount_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Compar
     x, y, z = np.moveaxis(corners, 2, 0)
     on_foot = np.any([np.hypot(x - at[0], y - at[1]) < FOOT_RADIUS + 0.1 for at in mounted.holes], axis=0)
     seat = body.middles((on_foot & (abs(z - mounted.ears) < 0.01)).all(axis=1))
-    bodies = link_bodies(scanner, assembly)
+    bodies = link_bodies(assembly)
     mount, standing = of_solid(assembly.made[BASE_MOUNT], printer.density_g_cm3), bodies["servo"]
     rotor = rotor_of(scanner, bodies)
     masses = np.array([standing.mass_kg, -mount.mass_kg, rotor.mass_kg])
@@ -208,7 +205,7 @@ def mount_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Compar
     stays = found.mean(axis=0)
     bend = float(np.linalg.norm(stays))
     changes = float(np.linalg.norm(found - stays, axis=1).max())
-    load = carried(scanner, assembly, bodies)
+    load = carried(assembly, bodies)
     own = sum(mount_sag(assembly.mesh(BASE_MOUNT), deck, mounted, load, *material)[:2])
     stated = float(LEAST_ERROR * np.linalg.norm(own))
     return Compared(bend, float(np.linalg.norm(own - stays)), stated, changes, len(body.nodes))

@@ -27,12 +27,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cad import slicer
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies
 from scanwright.cad.assembly.print_settings import slicer_settings
 from scanwright.cad.checks.run import run_checks
-from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.plates import threemf_bytes
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.geometry.print_pose import on_bed
 from scanwright.design.angles import Angles, AngleSet
@@ -129,7 +128,7 @@ def _made(combinations: tuple[Products, ...], numbered: tuple[int, Scanner]) -> 
     setting = f"{' '.join(which)} {tuple(scanner.angles.angles_deg.model_dump().values())}"
     try:
         assembly = make_parts(scanner)
-        checks, _ = run_checks(scanner, assembly, no_progress)
+        checks, _ = run_checks(assembly, no_progress)
     except BuildError as error:
         return Made(which, setting, refused=str(error))
     values = _values(scanner, assembly, checks) | {"processor_s": time.process_time() - start}
@@ -179,7 +178,7 @@ def _values(scanner: Scanner, assembly: Assembly, checks: list[Finding]) -> dict
         "h_mm": assembly.layout.stack.h,
         **printed,
         "printed_g": sum(printed.values()),
-        "rotor_g": 1000 * link_bodies(scanner, assembly)["rot"].mass_kg,
+        "rotor_g": 1000 * link_bodies(assembly)["rot"].mass_kg,
         "bearing": float(assembly.layout.stack.bearing is not None),
         "sub_plate": float(assembly.layout.stack.sub_plate is not None),
         "counterweight": float("counterweight" in assembly.made),

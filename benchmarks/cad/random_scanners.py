@@ -120,7 +120,7 @@ def _outcome(scanner: Scanner, refused: Counter[str], failed: Counter[str]) -> t
     """Make and check one scanner."""
     try:
         assembly = make_parts(scanner)
-        checks = run_checks(scanner, assembly, no_progress)[0]
+        checks = run_checks(assembly, no_progress)[0]
     except BuildError as error:
         refused[general(str(error), scanner.lidar.name)] += 1
         return "refused", str(error)

@@ -89,10 +89,10 @@ def _built(scanner: Scanner, parts_only: bool) -> dict[str, Any]:
             made = build_parts(scanner, make_parts(scanner), folder, no_progress)
         except BuildError as error:
             return {"error": str(error), "files": {}, "checks": []}
-        checks = check_files(scanner, made.assembly, no_progress)
+        checks = check_files(made.assembly, no_progress)
         if not parts_only:
             export_scanner(scanner, made, folder, no_progress)
-            write_files(folder, drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest))
+            write_files(folder, drawing_files(made.assembly, made.masses_g()))
         write_files(folder, checks)
         files = {
             str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()

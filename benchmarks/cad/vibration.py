@@ -18,12 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.cad.elements import CALCULIX, HEAD_MM, Tetrahedra, tetrahedra
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, link_bodies
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies
-from scanwright.cad.checks.loads.deflection import deflection_checks
-from scanwright.cad.checks.loads.mount import mount_checks
-from scanwright.cad.checks.loads.vibration import ERROR, row_of_scanner
+from scanwright.cad.checks.loads.deflection import ERROR, deflection_checks, mount_checks, row_of_scanner
 from scanwright.cad.geometry.inertia import Inertial, together
 from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_nm_per_rad
 from scanwright.cad.layout.belt.stack import BeltStack
@@ -129,7 +126,7 @@ def by_calculix(scanner: Scanner, assembly: Assembly, folder: Path) -> Array:
     stack, linkage, bodies, R = (
         layout.stack,
         layout.linkage,
-        link_bodies(scanner, assembly),
+        link_bodies(assembly),
         scanner.angles.R_rot_laser(),
     )
     plastic = 1000 * printer.modulus_gpa, printer.density_g_cm3, POISSON
@@ -240,10 +237,10 @@ def main() -> None:
 
 def compared(name: str, scanner: Scanner, assembly: Assembly) -> bool:
     """Print the line of one scanner, and return whether the stated frequency is off by more than its error."""
-    bodies, meshes = link_bodies(scanner, assembly), assembly.meshes()
-    (_, linkage), (_, mount) = (check(scanner, assembly, bodies, meshes) for check in (deflection_checks, mount_checks))
+    bodies = link_bodies(assembly)
+    (_, linkage), (_, mount) = (check(assembly, bodies) for check in (deflection_checks, mount_checks))
     assert linkage is not None
-    own = row_of_scanner(scanner, assembly, bodies, linkage, mount).frequencies_hz()
+    own = row_of_scanner(assembly, bodies, linkage, mount).frequencies_hz()
     with tempfile.TemporaryDirectory() as folder:
         found = by_calculix(scanner, assembly, Path(folder))
     off = float(own[0] / found[0] - 1)

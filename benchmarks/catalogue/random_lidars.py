@@ -25,7 +25,7 @@ from benchmarks.cad.combinations import screws_without_a_hole
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.names import LIDAR_BODY
-from scanwright.cad.measure.walls import walls_of
+from scanwright.cad.measure.bores import walls_of
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue

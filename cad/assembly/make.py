@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.assembly import Assembly, rotor_moment
 from scanwright.cad.assembly.bought import BodySpec, bought_of
-from scanwright.cad.assembly.masses import rotor_moment
 from scanwright.cad.layout.layout import Layout
 from scanwright.cad.layout.names import BASE_MOUNT, COUNTERWEIGHT, TRIPOD_FOOT
 from scanwright.cad.parts.all_parts import laid_out, parts_of
@@ -51,7 +50,7 @@ def _balanced(assembly: Assembly) -> Assembly:
     bar = layout.counterweight
     assert not isinstance(bar, LeftOut)
     if len(assembly.carriers()) == sum(part.seat is not None for part in assembly.parts.values()):
-        bar = bar.balancing(rotor_moment(layout.scanner, assembly))  # all other parts are there
+        bar = bar.balancing(rotor_moment(assembly))  # all other parts are there
     spec = bar_spec(layout, bar)
     parts, made = assembly.parts | {spec.name: spec}, assembly.made | {spec.name: spec.make()}
     return replace(assembly, parts=parts, made=made)

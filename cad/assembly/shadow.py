@@ -56,11 +56,7 @@ class PartsWorkshop:
         return shadow_of(scanner, triangles_of(assembly), assembly.turning())
 
     def assembly(self, scanner: Scanner) -> Assembly:
-        """Return the parts of these products at the angles of `scanner`; they are made once.
-
-        Raises:
-            BuildError: a part cannot be made.
-        """
+        """Return the parts of these products at the angles of `scanner`; they are made once."""
         from scanwright.cad.assembly.make import make_parts
 
         angles = scanner.angles

@@ -68,7 +68,7 @@ class Blocked:
 def access_checks(assembly: Assembly) -> list[Finding]:
     """Return an error for each joint with a screw that no driver reaches, or one finding that there is none."""
     bodies = _bodies(assembly)
-    scenes = scenes_of(assembly, assembly.layout.joints)
+    scenes = scenes_of(assembly)
     findings = [
         _error(number, scene, joint, blocked)
         for number, scene in enumerate(scenes, start=1)

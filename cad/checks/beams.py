@@ -1,13 +1,12 @@
 """Beams that the parts hide."""
 
 import math
-from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from scanwright.cad.assembly.shadow import bundles
-from scanwright.cad.checks.limits import at_most, note
-from scanwright.cad.checks.table import LINKAGE_HIDES_SHARE
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.assembly.shadow import bundles, triangles_of
+from scanwright.cad.checks.table import LINKAGE_HIDES_SHARE, at_most, note
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.findings import Finding
@@ -16,13 +15,9 @@ from scanwright.design.scene import ray_caster
 from scanwright.design.self_occlusion import SelfOcclusion
 
 
-def beam_checks(
-    scanner: Scanner, shadow: SelfOcclusion, triangles_m: Mapping[str, Array], carriers: Collection[str]
-) -> list[Finding]:
-    """Return the width of the hidden beams, and of those that the linkage alone hides.
-
-    `triangles_m` are of `shadow.triangles_of`, `carriers` the names of linkage and sub-plate.
-    """
+def beam_checks(assembly: Assembly, shadow: SelfOcclusion) -> list[Finding]:
+    """Return the width of the hidden beams, and of those that the linkage alone hides."""
+    scanner, carriers, triangles_m = assembly.layout.scanner, assembly.carriers(), triangles_of(assembly)
     bearings = scanner.lidar.bearings_rad()
     step = math.degrees(float(bearings[1] - bearings[0]))
     hidden = shadow.hidden()

@@ -4,10 +4,9 @@ Clearance and hidden beams are checked with all other bodies, since cables are b
 """
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.checks.limits import at_least, note, tidy
-from scanwright.cad.layout.cables import joint
-from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
-from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.checks.table import at_least, note, tidy
+from scanwright.cad.layout.cables.leads import JOINT_LENGTH, RotorLead, straights, tied_mm
+from scanwright.cad.layout.cables.route import Path
 from scanwright.cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.design.findings import Finding
@@ -45,7 +44,7 @@ def _checks(lead: RotorLead, subject: str, seat: TieSeat | None) -> list[Finding
         what = f"no path from the outlet at y = {lead.y:g} mm to the ring"
         hint = "choose thinner leads, or another azimuth of the cable"
         return [_no_path(subject, what, lead.radius, lead.diameter, hint)]
-    longest = max((piece.length for piece in joint.straights(lead.path)), default=0.0)
+    longest = max((piece.length for piece in straights(lead.path)), default=0.0)
     straight = longest if lead.joint is None else lead.joint.piece.length
     tied = None if seat is None else tied_mm(lead, seat)
     what, hint = f"{subject}: no slotted tab of the hub is near", "tie it to the part next to it"
@@ -55,7 +54,7 @@ def _checks(lead: RotorLead, subject: str, seat: TieSeat | None) -> list[Finding
         tie = Finding("lead_tie", "ok", subject, what, tidy(tied), None, "mm")
     return [
         _bend(subject, lead.path, lead.radius),
-        at_least("lead_joint", straight, joint.LENGTH, "mm", subject, "straight piece for its joint"),
+        at_least("lead_joint", straight, JOINT_LENGTH, "mm", subject, "straight piece for its joint"),
         note("lead_length", lead.path.length(), "mm", subject, "from the ring's rotor to the jacket of the cable"),
         tie,
     ]

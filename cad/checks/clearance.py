@@ -13,8 +13,7 @@ import numpy as np
 import shapely
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.checks.limits import at_least, at_most
-from scanwright.cad.checks.table import CLEARANCE_MM, OVERLAP_MM3
+from scanwright.cad.checks.table import CLEARANCE_MM, OVERLAP_MM3, at_least, at_most
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding

@@ -6,14 +6,14 @@ note; thin walls on more than THIN_SHARE of the surface are an error.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad.checks.limits import at_least, at_most, figures, note, spot, tidy
-from scanwright.cad.checks.table import SMALLEST_HOLE_MM, THIN_SHARE
+from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.checks.table import SMALLEST_HOLE_MM, THIN_SHARE, at_least, at_most, figures, note, spot, tidy
 from scanwright.cad.geometry.holes import Round, rounds_of
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import PrintPose, on_bed
@@ -30,22 +30,24 @@ SMALL_MM2 = 0.2  # smaller outlines are less than a line of a 0.4 mm nozzle
 NEAR_HOLE_MM = 2.0  # from a thin spot to a hole that is named with it
 
 
-def printing_checks(
-    printer: Printer, printed: Mapping[str, cq.Solid], meshes: Mapping[str, TriMesh], poses: Mapping[str, PrintPose]
-) -> list[Finding]:
+def printing_checks(assembly: Assembly) -> Iterator[Finding]:
     """Check every printed part in its print pose."""
-    checks = []
-    for name, solid in printed.items():
-        pose = poses[name]
-        checks.append(_bed(name, pose, printer))
-        checks.append(note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg"))
-        checks.append(islands_check(name, meshes[name], pose))
-        holes = [feature for feature in rounds_of(solid) if feature.hole]
-        checks.append(_walls(name, meshes[name], printer, holes))
-        if holes:
-            smallest = min(hole.diameter for hole in holes)
-            checks.append(at_least("smallest_hole", smallest, SMALLEST_HOLE_MM, "mm", name, "smallest hole"))
-    return checks
+    for name, solid in assembly.made.items():
+        if not assembly.parts[name].metal:
+            pose, printer = assembly.print_pose(name), assembly.layout.scanner.printer
+            yield from part_checks(name, solid, assembly.mesh(name), pose, printer)
+
+
+def part_checks(name: str, solid: cq.Solid, mesh: TriMesh, pose: PrintPose, printer: Printer) -> Iterator[Finding]:
+    """Check a printed part in its print pose."""
+    yield _bed(name, pose, printer)
+    yield note("support", pose.support_mm3, "mm3", name, "support under overhangs of more than 45 deg")
+    yield islands_check(name, mesh, pose)
+    holes = [feature for feature in rounds_of(solid) if feature.hole]
+    yield _walls(name, mesh, printer, holes)
+    if holes:
+        smallest = min(hole.diameter for hole in holes)
+        yield at_least("smallest_hole", smallest, SMALLEST_HOLE_MM, "mm", name, "smallest hole")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +107,15 @@ def _bed(name: str, pose: PrintPose, printer: Printer) -> Finding:
 def _surface(mesh: TriMesh) -> tuple[Array, Array, float]:
     """Return points spread over the surface by area, their normals, and the area: the same points in every run."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    cross = np.cross(b - a, c - a)
-    doubled = np.linalg.norm(cross, axis=1)
-    upto = np.cumsum(doubled)
+    normals, areas = mesh.across()
+    upto = np.cumsum(areas)
     where = (np.arange(POINTS) + 0.5) / POINTS * upto[-1]
     face = np.searchsorted(upto, where)
     # a low-discrepancy pair inside each triangle
     u = np.sqrt((0.5 + np.arange(POINTS) * 0.7548776662466927) % 1.0)
     v = (0.5 + np.arange(POINTS) * 0.5698402909980532) % 1.0
     points = (1 - u)[:, None] * a[face] + (u * (1 - v))[:, None] * b[face] + (u * v)[:, None] * c[face]
-    return points, cross[face] / doubled[face, None], float(upto[-1] / 2)
+    return points, normals[face], float(upto[-1])
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,13 @@ Constant limits are here, with their reason; limits of products, printer or layo
 from dataclasses import replace
 from typing import NamedTuple
 
-from scanwright.cad.layout.loads import SHOCK_G
-from scanwright.design.findings import Finding
+from scanwright.cad.layout.tightening import HELD_G, LEAST_MARGIN, SHOCK_G
+from scanwright.design.arrays import Array
+from scanwright.design.findings import Finding, Severity
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
 LINKAGE_HIDES_SHARE = 0.03  # of the field of view, beyond servo, ring and shaft; J with parts accounts for it
-HELD_G = 2.0  # bumps that must not turn the mount: assumed
-LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
 FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
 LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
 THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is unusable
@@ -163,3 +162,66 @@ def table_page() -> str:
         "An error fails the build.\n\n| code | what is checked | limit | source of the limit |\n"
         f"| --- | --- | --- | --- |\n{rows}\n"
     )
+
+
+def at_most(
+    code: str,
+    value: float,
+    limit: float,
+    unit: str,
+    subject: str,
+    what: str,
+    error: float | None = None,
+    hint: str = "",
+) -> Finding:
+    """Return an error if the value exceeds the limit or is NaN, a warning if value + error does.
+
+    `subject` is a part or product, `what` the name of the value, `hint` what to do if it does not pass.
+    """
+    within, surely = value <= limit, value + (error or 0.0) <= limit
+    severity: Severity = "ok" if surely else "warning" if within else "error"
+    message = f"{subject}: {what}: {with_error(value, error)} {unit} (at most {figures(limit)})"
+    return Finding(code, severity, subject, message, tidy(value), tidy(limit), unit, "" if surely else hint)
+
+
+def at_least(code: str, value: float, limit: float, unit: str, subject: str, what: str) -> Finding:
+    """Return an error if the value is below the limit; arguments as for `at_most`."""
+    message = f"{subject}: {what}: {figures(value)} {unit} (at least {figures(limit)})"
+    return Finding(code, "error" if value < limit else "ok", subject, message, tidy(value), tidy(limit), unit)
+
+
+def note(code: str, value: float, unit: str, subject: str, what: str, error: float | None = None) -> Finding:
+    """Return a value that has no limit; arguments as for `at_most`."""
+    message = f"{subject}: {what}: {with_error(value, error)} {unit}"
+    return Finding(code, "note", subject, message, tidy(value), None, unit)
+
+
+def rated(
+    code: str, value: float, rating: float | None, unit: str, subject: str, what: str, by: str = "", hint: str = ""
+) -> Finding:
+    """Return `at_most` of a maker's rating, whose origin is `by`, or a note if the maker states none."""
+    if rating is None:
+        return note(code, value, unit, subject, f"{what}, unrated by its maker")
+    return at_most(code, value, rating, unit, subject, f"{what}{by}", hint=hint)
+
+
+def with_error(value: float, error: float | None) -> str:
+    """Return a value with its uncertainty, if that is known."""
+    return figures(value) if error is None else f"{figures(value)} ± {error:.1g}"
+
+
+def figures(value: float) -> str:
+    """Return three significant figures, without an exponent for large numbers."""
+    short = f"{value:.3g}"
+    return f"{float(short):,.0f}" if "e+" in short else short
+
+
+def spot(point: Array) -> str:
+    """Return a point [mm], shape (3,), for a message, to a tenth."""
+    x, y, z = (f"{round(float(c), 1) + 0.0:g}" for c in point)
+    return f"at ({x}, {y}, {z}) in the rotation frame"
+
+
+def tidy(value: float) -> float:
+    """Round to four significant digits: further ones depend on the kernel's version."""
+    return float(f"{value:.4g}") + 0.0

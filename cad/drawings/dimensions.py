@@ -53,12 +53,8 @@ def spread(wanted: Sequence[float], step: float) -> Array:
 def ordinates(pen: Pen, values: dict[float, float], edge: float, *, below: bool, sign: float = 1.0) -> None:
     """Draw horizontal positions under a view, or vertical ones at its left.
 
-    Args:
-        pen: about the view's origin.
-        values: by position the place of its feature across it [mm of the model].
-        edge: of the view, lower or left.
-        below: whether under the view.
-        sign: -1 if the measured axis points to the left.
+    `values` are places across them by position [mm of the model]; `edge` is the lower or left one of the view; `sign`
+    is -1 if the measured axis points to the left.
     """
     places = thinned(values)
     for (value, aside), place in zip(places, spread([v * pen.scale for v, _ in places], STEP_MM), strict=True):
@@ -112,16 +108,24 @@ def callouts_right(pen: Pen, callouts: list[Callout], edge: float) -> None:
         own.text((x + 2.8, y - TEXT_MM / 2 + 0.2), callout.words)
 
 
-def text_box(at: Point, words: str, height: float = TEXT_MM, anchor: str = "left") -> tuple[float, float, float, float]:
-    """Return left, bottom, right and top of the space around a line of text."""
-    width = width_of(words, height)
-    left = at[0] - ANCHORS[anchor][1] * width
-    return left - CLEAR_MM, at[1] - CLEAR_MM, left + width + CLEAR_MM, at[1] + height + CLEAR_MM
+def free_text(
+    pen: Pen,
+    words: str,
+    choices: Sequence[tuple[Point, str]],
+    lines: Sequence[Sequence[Point]],
+    height: float = TEXT_MM,
+) -> None:
+    """Write a text at the first of some places, each with an anchor, that no line meets, else at the first."""
 
+    def space(at: Point, anchor: str) -> shapely.Polygon:
+        width = width_of(words, height)
+        left = at[0] - ANCHORS[anchor][1] * width
+        return shapely.box(left - CLEAR_MM, at[1] - CLEAR_MM, left + width + CLEAR_MM, at[1] + height + CLEAR_MM)
 
-def meets(path: Sequence[Point], box: tuple[float, float, float, float]) -> bool:
-    """Return whether straight pieces through points meet a box."""
-    return bool(shapely.LineString(path).intersects(shapely.box(*box)))
+    drawn = [shapely.LineString(line) for line in lines]
+    free = (choice for choice in choices if not any(line.intersects(space(*choice)) for line in drawn))
+    place, anchor = next(free, choices[0])
+    pen.text(place, words, height=height, anchor=anchor)
 
 
 def angle_between(pen: Pen, at: Point, first: float, second: float, radius: float, words: str) -> None:

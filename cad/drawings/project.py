@@ -48,6 +48,12 @@ class Arc:
     end: float
     hidden: bool
 
+    @property
+    def points(self) -> list[tuple[float, float]]:
+        """Points on it, close together."""
+        (x, y), turns = self.centre, np.linspace(self.start, self.end, 17).tolist()
+        return [(x + self.radius * math.cos(turn), y + self.radius * math.sin(turn)) for turn in turns]
+
 
 @dataclass(frozen=True, slots=True)
 class Chain:
@@ -61,14 +67,7 @@ Curve = Arc | Chain
 
 
 def project(solid: cq.Shape, right: Array, up: Array, zero: Array, *, hidden: bool = True) -> list[Curve]:
-    """Return the lines of a solid in the plane of a view, in a fixed order.
-
-    Args:
-        solid: to draw.
-        right: unit vector that points to the right of the view.
-        up: unit vector that points up in it; the viewer is at right x up.
-        zero: point that the plane has its zero at.
-        hidden: whether to include hidden lines.
+    """Return the lines of a solid in the plane of a view, in a fixed order; `zero` is at the zero of the plane.
 
     Raises:
         BuildError: the kernel finds no lines.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ezdxf.document import Drawing
 from reportlab.lib.utils import simpleSplit
 
-from scanwright.cad.drawings.part import Part
+from scanwright.cad.drawings.patterns import Part
 from scanwright.cad.drawings.pen import CAPITAL, GLYPH_WIDTH, Pen, Point, document_at
 from scanwright.cad.drawings.sizes import draw, sizes_of
 from scanwright.cad.drawings.views import views_of

@@ -11,15 +11,22 @@ from scanwright.cad.drawings.dimensions import (
     angle_between,
     callouts_right,
     centre_mark,
+    free_text,
     leaders_right,
-    meets,
     ordinates,
-    text_box,
 )
-from scanwright.cad.drawings.part import SIDE_MM2, STRAIGHT, Part, azimuth_deg, parallel, planes_across
-from scanwright.cad.drawings.patterns import Pattern, number
+from scanwright.cad.drawings.patterns import (
+    SIDE_MM2,
+    STRAIGHT,
+    Part,
+    Pattern,
+    azimuth_deg,
+    number,
+    parallel,
+    planes_across,
+)
 from scanwright.cad.drawings.pen import TEXT_MM, Layer, Pen, Point
-from scanwright.cad.drawings.project import Arc, Curve
+from scanwright.cad.drawings.project import Arc
 from scanwright.cad.drawings.views import View, Z, has_view, outwards_of, shows_angle
 
 NEARLY_MM = 0.2  # an extent that differs less from a radius is that radius, notched
@@ -120,22 +127,11 @@ def _centre_lines(pen: Pen, view: View, part: Part, box: tuple[float, float, flo
 
 def _name_centre(pen: Pen, view: View, at: Point) -> None:
     """Write the name at the optical centre, on the first side without a line of the part."""
-    words, (x, y), right = "OPTICAL CENTRE", at, at[0] + CENTRE_GAP_MM
+    (x, y), right = at, at[0] + CENTRE_GAP_MM
     below = y - 1.0 - TEXT_MM
     choices = [((x - CENTRE_GAP_MM, y + 1.0), "right"), ((right, below), "left"), ((x - CENTRE_GAP_MM, below), "right")]
-    lines = [[pen.paper(point) for point in _points(curve)] for curve in view.curves]
-    free = (c for c in choices if not any(meets(line, text_box(c[0], words, anchor=c[1])) for line in lines))
-    place, anchor = next(free, choices[0])
-    pen.text(place, words, anchor=anchor)
-
-
-def _points(curve: Curve) -> list[Point]:
-    """Return points on a curve of a view."""
-    if not isinstance(curve, Arc):
-        return list(curve.points)
-    (x, y), radius = curve.centre, curve.radius
-    turns = [curve.start + (curve.end - curve.start) * k / 16 for k in range(17)]
-    return [(x + radius * math.cos(turn), y + radius * math.sin(turn)) for turn in turns]
+    lines = [[pen.paper(point) for point in curve.points] for curve in view.curves]
+    free_text(pen, "OPTICAL CENTRE", choices, lines)
 
 
 def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) -> None:
@@ -150,13 +146,7 @@ def _cut_marks(pen: Pen, left: float, right: float, lines: list[list[Point]]) ->
             ((end, -2 * MARK_MM - CAPITALS_MM - 1.5), "middle"),
             ((end, 1.5), "middle"),
         ]
-        free = (
-            choice
-            for choice in choices
-            if not any(meets(line, text_box(choice[0], "S", CAPITALS_MM, choice[1])) for line in lines)
-        )
-        place, anchor = next(free, choices[0])
-        pen.text(place, "S", height=CAPITALS_MM, anchor=anchor)
+        free_text(pen, "S", choices, lines, CAPITALS_MM)
 
 
 def _holes(sizes: Sizes, view: View, part: Part) -> None:

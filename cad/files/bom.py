@@ -11,15 +11,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 
 from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.cable_instructions import tied_at
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
+from scanwright.cad.assembly.scenes import tied_at
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.drawings.files import drawing_number
-from scanwright.cad.files.prices import EACH_USD, ESTIMATED, FILAMENT_USD_PER_KG, RECENT, UNSURE, year_of
+from scanwright.cad.files.prices import EACH_USD, ESTIMATED, RECENT, UNSURE, year_of
 from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.tightening import hold_of
-from scanwright.cad.screws import INSERT_LENGTH, SCREWS
+from scanwright.cad.screws import INSERT_LENGTH
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Belt
@@ -33,6 +33,7 @@ STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of th
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
 WASTE = 0.1  # of the plastic of the parts, more for supports and failed prints
+FILAMENT_USD_PER_KG = (15.0, 35.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +61,11 @@ class BomItem:
 COLUMNS = [field.name for field in fields(BomItem)][:-1]
 
 
-def items_of(
-    scanner: Scanner,
-    assembly: Assembly,
-    joints: Sequence[Joint],
-    masses_g: dict[str, float],
-    config_hash: str,
-    plates: Sequence[Sequence[str]] = (),
-) -> list[BomItem]:
+def items_of(assembly: Assembly, masses_g: dict[str, float], plates: Sequence[Sequence[str]] = ()) -> list[BomItem]:
     """Return all rows, the total last; `masses_g` are of the made parts, `plates` the parts printed together."""
-    items = []
+    items, scanner, joints = [], assembly.layout.scanner, assembly.layout.joints
     for name in assembly.made:
-        part, number = assembly.parts[name], drawing_number(config_hash, name, assembly)
+        part, number = assembly.parts[name], drawing_number(name, assembly)
         how = f"{scanner.printer.name}, {print_words(scanner.printer)}, from print/{name}.3mf"
         if part.metal:
             how = f"{', '.join(filter(None, (part.material, part.work)))}, after parts/{name}.step"
@@ -84,7 +78,7 @@ def items_of(
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _small_things(assembly, joints)
+    items += _small_things(assembly)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
@@ -123,30 +117,27 @@ def _products(scanner: Scanner, drive: DriveLayout) -> Iterator[BomItem]:
 
 def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
     screws: dict[str, list[Joint]] = {}
-    nuts: Counter[tuple[str, str]] = Counter()
-    inserts: Counter[str] = Counter()
-    washers: Counter[str] = Counter()
+    small: Counter[tuple[int, str, str, str, str]] = Counter()  # by place in the list, kind, name, number, note
     for joint in joints:
+        screw = joint.screw
         if joint.protrudes_mm is None:
             screws.setdefault(joint.number, []).append(joint)
         if joint.fixing in ("nut", "deck") or joint.traps:
-            nuts[joint.screw.name, joint.screw.nut_standard] += joint.count
+            small[0, "nut", "hexagon nut", f"{screw.nut_standard} {screw.name}", ""] += joint.count
         if joint.washer_mm is not None:
-            washers[f"ISO 7093 {joint.screw.name}"] += joint.count
+            small[1, "washer", "plain washer", f"ISO {7093 if screw.nominal >= 3 else 7089} {screw.name}", ""] += (
+                joint.count
+            )
         if joint.inserts:
-            inserts[joint.screw.name] += joint.count
+            note = f"length {INSERT_LENGTH:g}, for a hole of {screw.insert:g} mm"
+            small[2, "insert", "heat-set insert", screw.name, note] += joint.count
     for number, used in sorted(screws.items()):
         kind = "grub screw" if used[0].fixing == "grub" else "cap screw"
         places = ", ".join(f"{joint.count} {joint.part} to {joint.onto}" for joint in used)
         total = sum(joint.count for joint in used)
         yield BomItem("screw", kind, number, total, source=JOINTS, note=places, estimate="screw")
-    for (name, standard), count in sorted(nuts.items()):
-        yield BomItem("nut", "hexagon nut", f"{standard} {name}", count, source=JOINTS, estimate="nut")
-    for number, count in sorted(washers.items()):
-        yield BomItem("washer", "plain washer", number, count, source=JOINTS, estimate="washer")
-    for name, count in sorted(inserts.items()):
-        note = f"length {INSERT_LENGTH:g}, for a hole of {SCREWS[name].insert:g} mm"
-        yield BomItem("insert", "heat-set insert", name, count, source=JOINTS, note=note, estimate="insert")
+    for (_, kind, name, number, note), count in sorted(small.items()):
+        yield BomItem(kind, name, number, count, source=JOINTS, note=note, estimate=kind)
 
 
 def _wiring(scanner: Scanner) -> Iterator[BomItem]:
@@ -254,8 +245,9 @@ def _electrics(scanner: Scanner) -> Iterator[BomItem]:
         yield BomItem("wiring", part, number, quantity, source=WIRING_TEXT, note=note, estimate=estimate)
 
 
-def _small_things(assembly: Assembly, joints: Sequence[Joint]) -> Iterator[BomItem]:
+def _small_things(assembly: Assembly) -> Iterator[BomItem]:
     """Yield small things of the parts, consumables, and tools."""
+    joints = assembly.layout.joints
     rows = dict.fromkeys(row for name in assembly.made for row in assembly.parts[name].rows)
     needs = [BomItem(row.kind, row.part, source=row.source, note=row.note, estimate=row.estimate) for row in rows]
     yield from (need for need in needs if need.kind != "tool")

@@ -1,20 +1,32 @@
-"""Binary glTF 2.0 from canonical meshes: metres, a tree of named nodes, the same bytes for the same scene.
+"""The scanner in 3D, binary glTF 2.0: `assembly.glb` in the tree of its frames, and `exploded.glb` in build order.
 
-glTF is y-up and the project z-up: one root node turns z to y. Normals are smooth on round surfaces and sharp at edges.
+    y_up - world - servo - rot - laser, the frames of `scanner.urdf`; each body is in the frame that it moves with.
+
+Exploded, each product is lifted along the rotation axis until it is free of those below it; lidar and sub-plate move
+along the lidar's z, a counterweight along its radius.
+
+Metres. glTF is y-up and the project z-up: one root node turns z to y. Normals are smooth on round surfaces, sharp at
+edges. The same scene gives the same bytes.
 """
 
 import json
+import math
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, FIXED_CABLES, LIDAR, ROTOR_LEADS
+from scanwright.cad.layout.rotor.counterweight import Counterweight
 from scanwright.design.arrays import Array
+from scanwright.design.scanner import Scanner
 
+GAP_MM = 15.0  # between the products of the exploded view
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
 Z_TO_Y = [-0.7071067811865476, 0.0, 0.0, 0.7071067811865476]  # quaternion of a quarter turn about -x
@@ -43,11 +55,8 @@ def glb_bytes(
 ) -> bytes:
     """Return the file of a scene.
 
-    Args:
-        nodes: parents before children; the first one is the root.
-        surfaces: of the nodes with a mesh by name, of `shaded`.
-        extras: values in `asset.extras`.
-        spin: name of a node that turns counter-clockwise about its z, and the seconds of one turn.
+    Of `nodes` the first is the root, and parents come before children; `surfaces` are those of `shaded` by node; `spin`
+    is a node that turns counter-clockwise about its z, and the seconds of one turn.
     """
     index = {node.name: i + 1 for i, node in enumerate(nodes)}
     children: dict[str, list[int]] = {}
@@ -132,14 +141,10 @@ def shaded(mesh: TriMesh) -> Surface:
     A vertex is repeated for each of its normals. The normal at a corner is the mean of those of the faces around it
     without an edge towards this one, weighted by their angles.
     """
-    corners = mesh.vertices[mesh.faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1)
-    normal = cross / np.maximum(length, 1e-300)[:, None]
-    vertex = mesh.faces.ravel()
+    corners, vertex, (normal, area) = mesh.vertices[mesh.faces], mesh.faces.ravel(), mesh.across()
     one, other = _about_one_vertex(vertex)
     alike = np.einsum("ij,ij->i", normal[one // 3], normal[other // 3]) > np.cos(CREASE_RAD)
-    alike |= length[one // 3] == 0  # a sliver has no normal of its own
+    alike |= area[one // 3] == 0  # a sliver has no normal of its own
     weight = np.where(alike, _widths(corners).ravel()[other], 0.0)
     mean = np.stack([np.bincount(one, weight * normal[other // 3, k], len(vertex)) for k in range(3)], axis=1)
     unit = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
@@ -188,3 +193,84 @@ def _turning(buffer: _Buffer, node: int, period_s: float) -> dict[str, Any]:
     sampler = {"input": when, "output": buffer.add(turns, "VEC4", FLOAT), "interpolation": "LINEAR"}
     channel = {"sampler": 0, "target": {"node": node, "path": "rotation"}}
     return {"name": "spin", "samplers": [sampler], "channels": [channel]}
+
+
+def scene_files(scanner: Scanner, assembly: Assembly, meshes: dict[str, TriMesh], config_hash: str) -> dict[str, bytes]:
+    """Return both files; `meshes` are of the made parts, rotation frame."""
+    T = scanner.angles.T_rot_laser()
+    nodes = [
+        Node("world", "", np.eye(4)),
+        Node("servo", "world", scanner.angles.T_world_rot(0.0)),
+        Node("rot", "servo", np.eye(4)),
+        Node("laser", "rot", T),
+    ]
+    for name in (*assembly.made, *assembly.bought):
+        spec = assembly.spec(name)
+        frame = spec.frame
+        mesh = meshes[name] if name in meshes else assembly.mesh(name)
+        if frame == "laser":
+            mesh = TriMesh(np.round((mesh.vertices - T[:3, 3] * 1000) @ T[:3, :3], 6) + 0.0, mesh.faces)
+        nodes.append(Node(name, frame, np.eye(4), mesh, spec.colour, name in assembly.metal()))
+    motion = scanner.angles.motion
+    spin = ("rot", motion.period_s) if motion is not None and motion.mode == "spin" else None
+    extras = {"task": scanner.angles.task, "config": config_hash, "unit": "m"}
+    surfaces = {node.name: shaded(node.mesh) for node in nodes if node.mesh is not None}
+    return {
+        "assembly.glb": glb_bytes(nodes, surfaces, extras, spin),
+        "exploded.glb": glb_bytes(_exploded(nodes, assembly, T), surfaces, extras),
+    }
+
+
+def _exploded(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> list[Node]:
+    lifts = _lifts(nodes, assembly, T_rot_laser)
+    to_rot = {"servo": np.eye(3), "rot": np.eye(3), "laser": T_rot_laser[:3, :3]}
+    moved = []
+    for node in nodes:
+        if node.mesh is not None:
+            shifted = np.eye(4)
+            shifted[:3, 3] = np.round(to_rot[node.parent].T @ lifts[assembly.thing(node.name)] / 1000, 9) + 0.0
+            node = replace(node, T_parent_node=shifted)
+        moved.append(node)
+    return moved
+
+
+def _lifts(nodes: list[Node], assembly: Assembly, T_rot_laser: Array) -> dict[str, Array]:
+    """Return the displacement of each product in the exploded view, in the rotation frame [mm]."""
+    clouds: dict[str, list[Array]] = {}
+    for node in nodes:
+        if node.mesh is not None:
+            cloud = node.mesh.vertices
+            if node.parent == "laser":
+                cloud = cloud @ T_rot_laser[:3, :3].T + T_rot_laser[:3, 3] * 1000
+            clouds.setdefault(assembly.thing(node.name), []).append(cloud)
+    points = {product: np.concatenate(parts) for product, parts in clouds.items()}
+    axis, out = np.array([0.0, 0.0, 1.0]), T_rot_laser[:3, 2]
+    lifts: dict[str, Array] = {}
+    top = -np.inf
+    along = {name: part.lifted for name, part in assembly.parts.items() if name in points} | {LIDAR: "lidar"}
+    stacked = [product for product in assembly.layout.drive.stacked if product in points]
+    for product in stacked:
+        low, high = float(points[product][:, 2].min()), float(points[product][:, 2].max())
+        lift = max(0.0, top + GAP_MM - low)
+        lifts[product] = lift * axis
+        top = high + lift
+    normal = np.array(assembly.layout.deck.normal)
+    lifts |= {product: -GAP_MM * normal for product in along if along[product] == "deck"}
+    if ROTOR_LEADS in points:  # they stay where they run, at the linkage
+        lifts[ROTOR_LEADS] = lifts[ALIGNMENT_LINKAGE]
+    if FIXED_CABLES in points:  # likewise, at the mount or the deck
+        lifts[FIXED_CABLES] = lifts.get(BASE_MOUNT, np.zeros(3))
+    top, linkage = float((points[ALIGNMENT_LINKAGE] @ out).max()), lifts[ALIGNMENT_LINKAGE]
+    bar = assembly.layout.counterweight
+    for product in (product for product in along if along[product] == "radius"):
+        assert isinstance(bar, Counterweight)
+        away = np.array([math.cos(bar.ear.azimuth), math.sin(bar.ear.azimuth), 0.0])
+        shift = (bar.ear.end - bar.start + GAP_MM) * away
+        lifts[product] = linkage + shift
+        top = max(top, float(((points[product] + shift) @ out).max()))
+    for product in (product for product in along if along[product] == "lidar"):
+        heights = points[product] @ out
+        lift = top + GAP_MM - float(heights.min())
+        lifts[product] = linkage + lift * out
+        top = float(heights.max()) + lift
+    return lifts

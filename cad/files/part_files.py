@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """One made part: volume and mass, box in the rotation frame."""
+    """One made part: volume and mass without its label, box in the rotation frame."""
 
     name: str
     volume_mm3: float
@@ -42,7 +42,6 @@ class PartsResult:
     parts: tuple[PartReport, ...]  # properties of each made part
     findings: tuple[Finding, ...]  # remarks for a person
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
-    files: tuple[str, ...]  # relative to the build folder
 
     def masses_g(self) -> dict[str, float]:
         """Return the masses of the made parts by name."""
@@ -50,21 +49,16 @@ class PartsResult:
 
 
 def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Progress) -> PartsResult:
-    """Label every part and write it into a build folder.
+    """Label every part and write it into `parts/` of a build folder.
 
-    Args:
-        scanner: angles and products; `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
-        assembly: its parts.
-        folder: the build folder; `parts/` is made in it.
-        progress: callback for progress.
+    `scanner.angles.t_world_rot_mm` must be that of its deck, or zero.
 
     Raises:
         BuildError: a part has no closed mesh, or the angle set states another place of the optical centre.
     """
     progress("loading the CAD kernel")
-    from scanwright.cad.assembly.assembly import alone, as_tree
-    from scanwright.cad.assembly.masses import link_bodies
-    from scanwright.cad.checks.remarks import remarks_of
+    from scanwright.cad.assembly.assembly import alone, as_tree, link_bodies
+    from scanwright.cad.checks.products import remarks_of
     from scanwright.cad.files.step import step_text
     from scanwright.cad.files.urdf import urdf_text
     from scanwright.cad.geometry.mesh import checked, stl_bytes
@@ -81,13 +75,12 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
     reports = []
     meshes_of_parts: dict[str, TriMesh] = {}
     progress("engraving the labels")
-    labels = labelled_parts(scanner, assembly, digest)
-    made = assembly.made | labels.parts
-    for number, (name, solid) in enumerate(made.items()):
-        progress(f"meshing and writing {name}", number / len(made))
+    labels = labelled_parts(assembly)
+    for number, (name, solid) in enumerate(assembly.made.items()):
+        progress(f"meshing and writing {name}", number / len(assembly.made))
         part = assembly.parts[name]
-        mesh = labels.meshes[name] if name in labels.meshes else checked(assembly.mesh(name), solid, name)
-        meshes_of_parts[name] = mesh
+        plain = checked(assembly.mesh(name), solid, name)
+        mesh = meshes_of_parts[name] = labels.meshes.get(name, plain)
         text = step_text(alone(name, solid, part.colour), f"{name} config={digest}")
         files[f"parts/{name}.step"] = text.encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)
@@ -96,17 +89,16 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
         reports.append(PartReport(name, round(volume, 3), round(mass_g, 3), box, len(mesh.faces)))
     progress("writing assembly.step and scanner.urdf")
     files["assembly.step"] = step_text(as_tree(assembly), f"assembly config={digest}").encode("ascii")
-    bodies = link_bodies(scanner, assembly)
-    meshes = {"servo": assembly.fixed_parts(), "rot": assembly.turning_parts()}
+    bodies = link_bodies(assembly)
+    meshes = {"servo": assembly.parts_in("servo"), "rot": assembly.parts_in("rot")}
     files["scanner.urdf"] = urdf_text(scanner, assembly.layout.drive, bodies, meshes).encode("utf-8")
     write_files(folder, files)
     return PartsResult(
         assembly=assembly,
         meshes=meshes_of_parts,
         parts=tuple(reports),
-        findings=tuple(remarks_of(scanner, assembly)),
+        findings=tuple(remarks_of(assembly)),
         left_out=(*layout.left_out, *labels.left_out),
-        files=tuple(sorted(files)),
     )
 
 

@@ -9,7 +9,6 @@ import re
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
 
 ESTIMATED = "estimate of usual prices in 2026, not a quote"
-FILAMENT_USD_PER_KG = (15.0, 35.0)
 UNSURE = (0.7, 1.5)  # least and most over an unverified or old price: assumed
 RECENT = "2024"  # first year whose prices count as they are
 EACH_USD: dict[str, tuple[float, float]] = {

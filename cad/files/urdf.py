@@ -13,7 +13,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from scanwright.cad.geometry.inertia import Inertial
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Rod
+from scanwright.cad.layout.drive import DriveLayout, Rod
+from scanwright.cad.layout.envelope import Box
 from scanwright.design.arrays import Array
 from scanwright.design.frames import roll_pitch_yaw
 from scanwright.design.motion import Sweep
@@ -92,10 +93,10 @@ def _meshes(parts: list[str]) -> list[tuple[str, str]]:
     ]
 
 
-def _fixed_shape(shape: Cuboid | Rod) -> tuple[str, str]:
+def _fixed_shape(shape: Box | Rod) -> tuple[str, str]:
     if isinstance(shape, Rod):
         return _origin((0.0, 0.0, (shape.low + shape.high) / 2000)), _cylinder(shape.radius, shape.high - shape.low)
-    low, high = np.array(shape.low), np.array(shape.high)
+    low, high = np.array(shape)
     return _origin((low + high) / 2000), _box(high - low)
 
 

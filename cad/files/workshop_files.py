@@ -1,50 +1,42 @@
 """Files for the workshop besides STEP, STL and drawings: print files, scenes, parts list, wiring, assembly steps."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
-from scanwright.cad.checks.remarks import without_traps
-from scanwright.cad.drawings.devices.template import template_pdf
+from scanwright.cad.checks.products import without_traps
+from scanwright.cad.drawings.files import template_pdf
 from scanwright.cad.files.bom import bom_text, items_of
-from scanwright.cad.files.glb_scenes import scene_files
+from scanwright.cad.files.glb import scene_files
 from scanwright.cad.files.manual.instructions import step_files
 from scanwright.cad.files.part_files import PartsResult, write_files
-from scanwright.cad.files.plates import plate_files, plates_of
-from scanwright.cad.files.threemf import threemf_bytes
+from scanwright.cad.files.plates import plate_files, plates_of, threemf_bytes
 from scanwright.cad.files.wiring import wiring_files
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
-from scanwright.cad.labels.fit_coupon import fit_coupon
-from scanwright.cad.labels.test_plate import make_test_plate
+from scanwright.cad.labels.fit_coupon import fit_coupon, make_test_plate
+from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
-from scanwright.cad.layout.screw_patterns import screw_patterns
 from scanwright.design.findings import Finding
 from scanwright.design.left_out import LeftOut
 from scanwright.design.progress import Progress
 from scanwright.design.scanner import Scanner
 
 
-@dataclass(frozen=True, slots=True)
-class Exports:
-    """Written files, relative to the build folder, files that are not included, and remarks for a person."""
+def export_scanner(
+    scanner: Scanner, made: PartsResult, folder: Path, progress: Progress
+) -> tuple[list[Finding], list[LeftOut]]:
+    """Write all of them into a build folder; returns remarks for a person, and files that are not included.
 
-    files: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
-    findings: tuple[Finding, ...]
-
-
-def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: Progress) -> Exports:
-    """Write all of them into a build folder; `made` is the result of `part_files.build_parts`."""
-    assembly, masses = made.assembly, made.masses_g()
+    `made` is the result of `part_files.build_parts`.
+    """
+    assembly = made.assembly
     digest, joints = assembly.layout.digest, assembly.layout.joints
     metal, about = assembly.metal(), f"{scanner.angles.task}, config={digest}, {scanner.printer.name}"
     progress("writing print files")
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
-    coupon = checked_mesh(fit_coupon(scanner, assembly.layout.stack), FIT_COUPON)
     patterns = screw_patterns(joints, assembly.layout.stack.R())
-    first = {FIT_COUPON: coupon}
+    first = {FIT_COUPON: fit_coupon(scanner, assembly.layout.stack)}
     if (plate := make_test_plate(scanner, patterns)) is not None:
         first[TEST_PLATE] = checked_mesh(plate, TEST_PLATE)
     tried = {name: on_bed(mesh, print_pose(mesh, scanner.printer.bed_mm)) for name, mesh in first.items()}
@@ -60,15 +52,13 @@ def export_scanner(scanner: Scanner, made: PartsResult, folder: Path, progress: 
     files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv, wiring.svg and assembly.md with its pictures")
     named = [list(plate) for plate in plates]
-    items = items_of(scanner, assembly, joints, masses, digest, named)
+    items = items_of(assembly, made.masses_g(), named)
     files["bom.csv"] = bom_text(items).encode("utf-8")
-    files |= step_files(scanner, assembly, made.meshes, joints, named, digest)
+    files |= step_files(assembly, made.meshes, named)
     files |= wiring_files(scanner, digest)
     write_files(folder, files)
-    findings = without_traps(scanner.printer, joints)
-    left_out = tuple(
+    return without_traps(scanner.printer, joints), [
         LeftOut(f"print/{part}.3mf", "of metal: made after its STEP file", 1, "print files")
         for part in made.meshes
         if part in metal
-    )
-    return Exports(tuple(sorted(files)), left_out, tuple(findings))
+    ]

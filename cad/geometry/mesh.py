@@ -29,14 +29,21 @@ class TriMesh:
     vertices: Array  # (n, 3), mm
     faces: NDArray[np.int64]  # (m, 3)
 
+    def across(self) -> tuple[Array, Array]:
+        """Return the unit normals of the triangles, zero without area, shape (m, 3), and their areas [mm2]."""
+        a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
+        cross = np.cross(b - a, c - a)
+        doubled = np.linalg.norm(cross, axis=1)
+        return np.divide(cross, doubled[:, None], out=np.zeros_like(cross), where=doubled[:, None] > 0), doubled / 2
+
     def volume(self) -> float:
         """Return enclosed volume [mm3]."""
         a, b, c = (self.vertices[self.faces[:, i]] for i in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def manifold(self) -> manifold3d.Manifold:
-        """Return the mesh for booleans and slices, in single precision."""
-        return manifold3d.Manifold(manifold3d.Mesh(self.vertices.astype(np.float32), self.faces.astype(np.uint32)))
+        """Return the mesh for booleans and slices."""
+        return manifold3d.Manifold(manifold3d.Mesh64(self.vertices, self.faces.astype(np.uint64)))
 
     def is_closed(self) -> bool:
         """Return whether every edge is shared by exactly two triangles in opposite directions."""
@@ -48,7 +55,17 @@ class TriMesh:
 
 def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> TriMesh:
     """Tessellate a solid canonically, within a chord error [mm] and angle [rad]."""
-    points, triangles = _tessellated(solid, chord_error, chord_angle)
+    return _canonical(*_tessellated(solid, chord_error, chord_angle))
+
+
+def of_manifold(solid: manifold3d.Manifold) -> TriMesh:
+    """Return the canonical mesh of the result of a boolean."""
+    mesh = solid.to_mesh64()
+    return _canonical(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
+
+
+def _canonical(points: Array, triangles: NDArray[np.int64]) -> TriMesh:
+    """Return a mesh with rounded, merged and sorted vertices and faces."""
     raw = np.round(points, DECIMALS) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
     faces = index.reshape(-1)[triangles]
@@ -88,11 +105,7 @@ def checked_mesh(solid: cq.Solid, part: str) -> TriMesh:
 
 
 def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
-    """Return the mesh if it is closed and has the volume of its solid.
-
-    Raises:
-        BuildError: as `checked_mesh`.
-    """
+    """Return the mesh if it is closed and has the volume of its solid; raises as `checked_mesh`."""
     if not mesh.is_closed():
         raise BuildError(f"{part}: mesh: tolerance = {CHORD_ERROR} mm: the surface is not closed")
     off = mesh.volume() / solid.Volume() - 1
@@ -104,10 +117,7 @@ def checked(mesh: TriMesh, solid: cq.Solid, part: str) -> TriMesh:
 def stl_bytes(mesh: TriMesh, part: str, config_hash: str) -> bytes:
     """Return a binary STL; its header names the part, the configuration and the unit."""
     header = f"{part} config={config_hash} unit=mm".encode("ascii")
-    corners = mesh.vertices[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    corners, (normal, _) = mesh.vertices[mesh.faces], mesh.across()
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     table = np.zeros(len(corners), dtype=record)
     table["normal"], table["corners"] = np.round(normal, DECIMALS) + 0.0, corners

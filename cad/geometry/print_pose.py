@@ -37,7 +37,7 @@ class PrintPose:
 
 def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
     """Return the pose in which a part is printed, by the rule at the top of this module."""
-    faces = _Faces.of(mesh)
+    faces = _Faces(*mesh.across(), mesh.vertices[mesh.faces].sum(axis=1) / 3)
     poses = [_pose(mesh, faces, down, bed_mm) for down in _flats(mesh, faces)]
 
     def cost(pose: PrintPose) -> tuple[bool, float, float, float]:
@@ -61,14 +61,6 @@ class _Faces:
     normals: Array
     areas: Array
     middles: Array
-
-    @staticmethod
-    def of(mesh: TriMesh) -> _Faces:
-        a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-        cross = np.cross(b - a, c - a)
-        doubled = np.linalg.norm(cross, axis=1)
-        normals = np.divide(cross, doubled[:, None], out=np.zeros_like(cross), where=doubled[:, None] > 0)
-        return _Faces(normals, doubled / 2, (a + b + c) / 3)
 
 
 def _flats(mesh: TriMesh, faces: _Faces) -> Array:

@@ -1,11 +1,11 @@
 """Engraved label of a printed part: task, angles and configuration; FRONT at the lidar's front. Millimetres.
 
-The label is on the largest flat face with enough area and a wall behind it, preferably one that can be read on the
-assembled scanner, else one that touches nothing there. A small part gets the configuration alone or no label. Drawings,
-screws and checks use the part without its label.
+The label is in STL, 3MF and GLB, not in STEP; drawings, screws and checks use the part without it. It is on the largest
+flat face with enough area and a wall behind it, preferably one that can be read on the assembled scanner, else one that
+touches nothing there. A small part gets the configuration alone or no label.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -13,19 +13,17 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from scanwright.cad import solids
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry.holes import Piercing
-from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
-from scanwright.cad.labels.engrave import Groove, engrave, groove_of
-from scanwright.cad.labels.flats import Flat, flat_at, flats_of
+from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.labels.engrave import Flat, Groove, engrave, flat_at, flats_of, groove_of
 from scanwright.cad.labels.lettering import Lettering, Place
-from scanwright.cad.labels.visibility import FreeDistance, free_distance
 from scanwright.cad.parts.part_spec import PartSpec
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
+from scanwright.design.scene import ray_caster
 
 HEIGHTS = (4.5, 3.6)  # of letters, the first that fits
 MARGIN = 1.5  # of a face around its label
@@ -41,14 +39,43 @@ LONGEST = (16, 8)  # letters of a line, the first that fits
 DIGITS = 8  # of the configuration's hash
 FRONT_INSET = 10.0  # of its middle from the edge
 TURNS = tuple(np.array([[c, -s], [s, c]], dtype=float) for c, s in ((1, 0), (0, 1)))  # lengthwise first
+OFF = 0.05  # from the face to the start of the rays
+DECK_HALF = 2000.0
+DECK_BELOW = 0.2  # of its face in this scene: a foot that lies on it then touches it
+
+FreeDistance = Callable[[Flat, Array], Array]
+"""Distances from points of a face, shape (n, 2), to the next body: shape (n,), 0 if it touches, inf if none."""
+
+
+def free_distance(assembly: Assembly) -> FreeDistance:
+    """Return a measurement by rays against all bodies of the assembly and its deck."""
+    corners = [mesh.vertices[mesh.faces] for mesh in assembly.meshes().values()]
+    bodies = ray_caster.build_scene(np.concatenate([_deck(assembly), *corners]) / 1000)
+
+    def measured(flat: Flat, points: Array) -> Array:
+        normal = flat.frame[:, 2]
+        starts = (flat.at(points) + OFF * normal) / 1000
+        hits = ray_caster.cast(bodies, starts, np.broadcast_to(normal, starts.shape))
+        # a body on the face contains the start of the ray, which then meets its surface from within
+        within = (hits.triangle >= 0) & (bodies.normals[hits.triangle] @ normal > 0)
+        return np.asarray(1000 * np.where(within, 0.0, hits.range_m))
+
+    return measured
+
+
+def _deck(assembly: Assembly) -> Array:
+    """Return the deck as two triangles, shape (2, 3, 3)."""
+    axes, centre = assembly.layout.deck.rotation(), np.array(assembly.layout.deck.centre)
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * DECK_HALF
+    corners = centre - DECK_BELOW * axes[:, 2] + square @ axes[:, :2].T
+    return corners[[[0, 1, 2], [0, 2, 3]]]
 
 
 @dataclass(slots=True)
 class Labelled:
     """The labels of one scanner."""
 
-    parts: dict[str, cq.Solid] = field(default_factory=dict)  # with their labels, by name
-    meshes: dict[str, TriMesh] = field(default_factory=dict)  # of these
+    meshes: dict[str, TriMesh] = field(default_factory=dict)  # with their labels, by part
     left_out: list[LeftOut] = field(default_factory=list)  # labels that did not fit
 
 
@@ -84,9 +111,10 @@ class Ground:
         return not any(self.piercing.between(start + 0.05 * into, start + deep) for start in flat.at(points))
 
 
-def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> Labelled:
+def labelled_parts(assembly: Assembly) -> Labelled:
     """Engrave every printed part that has enough area."""
-    before, done, groove = free_distance(assembly), Labelled(), groove_of(scanner.printer)
+    layout, before, done = assembly.layout, free_distance(assembly), Labelled()
+    scanner, groove = layout.scanner, groove_of(layout.scanner.printer)
     for name, solid in assembly.made.items():
         part = assembly.parts[name]
         if part.metal:
@@ -98,7 +126,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
                 why = "a hole of the seat is in its place; the V in the edge also marks the front"
                 done.left_out.append(LeftOut(f"FRONT on {name}", why, 1, "labels"))
         ground = Ground(flats_of(solid, FACES, LEAST_MM2), Piercing(solid), groove, scanner.printer.min_wall_mm, front)
-        label = label_on(ground, label_texts(scanner, part, config_hash), before)
+        label = label_on(ground, label_texts(scanner, part, layout.digest), before)
         if label is None:
             why = "no free flat face is large enough"
             done.left_out.append(LeftOut(f"label of {name}", why, 1, "labels"))
@@ -106,7 +134,7 @@ def labelled_parts(scanner: Scanner, assembly: Assembly, config_hash: str) -> La
         words += [] if label is None else [label]
         if words:
             try:
-                done.parts[name], done.meshes[name] = engraved(solid, words, groove)
+                done.meshes[name] = engraved(assembly.mesh(name), words, groove, name)
             except BuildError as error:  # a part without its label is better than none
                 done.left_out.append(LeftOut(f"label of {name}", str(error), 1, "labels"))
     return done
@@ -136,16 +164,11 @@ def label_on(ground: Ground, texts: list[str], before: FreeDistance) -> tuple[Pl
     return None
 
 
-def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
-    """Return the part with lettering, and its mesh.
-
-    Raises:
-        BuildError: the grooves spoil the part.
-    """
-    grooves = [(place.flat, place.outlines(lines, groove.width)) for place, lines in words]
-    with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]) as checked:
-        cut = checked(engrave(solid, grooves, groove.depth))
-    return cut, checked_mesh(cut, "label")
+def engraved(mesh: TriMesh, words: Sequence[tuple[Place, Lettering]], groove: Groove, part: str) -> TriMesh:
+    """Return the mesh of a part with lettering; errors are those of `engrave`."""
+    return engrave(
+        mesh, [(place.flat, place.outlines(lines, groove.width)) for place, lines in words], groove.depth, part
+    )
 
 
 def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:

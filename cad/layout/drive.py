@@ -4,6 +4,8 @@ Rotation frame at gamma = 0, mm. `drive_of` in `cad/layout/placement.py` selects
 in its folder (`direct/`, `belt/`), which all other code reads.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,11 +13,11 @@ from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from scanwright.cad.layout.envelope import Envelope
+from scanwright.cad.layout.envelope import Box, Envelope
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import Fixing, fixing_of
 from scanwright.cad.layout.loads import ShaftBend
-from scanwright.cad.layout.names import BASE_MOUNT, SERVO_CASE
+from scanwright.cad.layout.names import BASE_MOUNT, BEARING, RING, SERVO_CASE
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole
 from scanwright.design.arrays import Array
@@ -28,16 +30,9 @@ from scanwright.design.scanner import Scanner
 
 HEAD_WALL = 2.0  # of a plate on the servo, next to the recess of a head
 Body = Literal["base", "rotor", "horn"]
+Place = Literal["", "_upper", "_lower"]
 Point = tuple[float, float, float]
 Record = TypeVar("Record")
-
-
-@dataclass(frozen=True, slots=True)
-class Cuboid:
-    """A box along the axes between two corners."""
-
-    low: Point
-    high: Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +43,13 @@ class Rod:
     low: float
     high: float
 
-    def cuboid(self) -> Cuboid:
+    def box(self) -> Box:
         """Return the box around it."""
         r = self.radius
-        return Cuboid((-r, -r, self.low), (r, r, self.high))
+        return (-r, -r, self.low), (r, r, self.high)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Station:
     """A part or a bought product, and its place in the stack from the deck to the linkage."""
 
@@ -63,12 +58,28 @@ class Station:
     z_mm: tuple[float, float]  # heights of its lower and upper end
     radius_mm: float  # of the cylinder or the box around it, from its own axis
     product: Servo | SlipRing | Bearing | Belt | None = None  # if it is bought
-    box: Cuboid | None = None  # homogeneous box with the product's mass
+    box: Box | None = None  # homogeneous box with the product's mass
     turning: float = 0.0  # share of that mass that turns about the axis
-    shape: Cuboid | Rod | None = None  # simple body of a fixed product, for the URDF
+    shape: Box | Rod | None = None  # simple body of a fixed product, for the URDF
     # which one it is, if there are two; the lower one is inserted from below
-    place: Literal["", "_upper", "_lower"] = ""
+    place: Place = ""
     order: str = ""  # order name, if that is not the name of the product
+
+    @classmethod
+    def half_turning(cls, product: SlipRing | Bearing, rod: Rod, place: Place = "") -> Station:
+        """Return a ring or a bearing about the axis, whose inner half turns."""
+        ring = isinstance(product, SlipRing)
+        return cls(
+            name=RING if ring else BEARING,
+            body="base",
+            z_mm=(rod.low, rod.high),
+            radius_mm=rod.radius,
+            product=product,
+            box=rod.box(),
+            turning=0.5,
+            shape=rod if ring else None,
+            place=place,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,19 +112,13 @@ def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], 
         front=servo.case_max_mm[2],
         seats=servo.front.z_mm,
         opening=opening,
-        half_x=plate_half_x(servo),
+        half_x=max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + screw.driver_radius + HEAD_WALL),
         screw=screw,
         hole=passing_hole(screw, scanner.printer),
         holes=holes,
         fixing=fixing_of(servo.front),
         thread_mm=servo.front.depth_mm,
     )
-
-
-def plate_half_x(servo: Servo) -> float:
-    """Return the half width of a plate on the servo's front: that of the case, or of its screws' heads."""
-    driver_radius = SCREWS[servo.front.screw].driver_radius
-    return max(servo.case_max_mm[0], max(x for x, _ in servo.front.places) + driver_radius + HEAD_WALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +218,7 @@ class DriveLayout:
         return tuple(each.product for each in self.stations if isinstance(each.product, Bearing | Belt))
 
     @property
-    def masses(self) -> tuple[tuple[Station, float, Cuboid], ...]:
+    def masses(self) -> tuple[tuple[Station, float, Box], ...]:
         """Stations of the bought products, with mass [g] and box."""
         stations = ((each, each.product, each.box) for each in self.stations)
         return tuple((each, product.mass_g, box) for each, product, box in stations if product and box)

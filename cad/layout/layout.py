@@ -54,11 +54,7 @@ class Layout(Placement):
 
 
 def layout_of(scanner: Scanner, parts_of: Parts) -> Layout:
-    """Lay out one scanner; `parts_of` returns its parts, and those that it does not need.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Lay out one scanner; `parts_of` returns its parts, and those that it does not need."""
     place = placement_of(scanner)
     described = parts_of(place)
     parts = [part for part in described if not isinstance(part, LeftOut)]

@@ -11,7 +11,6 @@ from scanwright.design.arrays import Array
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
-SHOCK_G = 5.0  # bumps and transport: assumed
 RATED_AT_MM = 10.0  # the servo's radial load is rated at this distance from the horn
 HORN_TILTS_RAD = 1e-3  # of a servo's horn at its rated moment: assumed, no maker states it
 RUBS_NM = (5e-3, 5e-3)  # of bearings, and of a ring whose friction is not in the catalogue: assumed

@@ -35,11 +35,7 @@ class Placement:
 
 
 def placement_of(scanner: Scanner) -> Placement:
-    """Place everything of one scanner.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Place everything of one scanner."""
     drive = drive_of(scanner)
     deck = deck_of(scanner, drive)
     body = linkage_body_of(scanner, drive.envelope, drive.stack)
@@ -61,11 +57,7 @@ def placement_of(scanner: Scanner) -> Placement:
 
 
 def drive_of(scanner: Scanner) -> DriveLayout:
-    """Return the drive of one scanner: a belt if the ring is a capsule, else the servo on the axis.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Return the drive of one scanner: a belt if the ring is a capsule, else the servo on the axis."""
     ring, envelope = scanner.slip_ring, envelope_of(scanner.lidar)
     capsule = ring is not None and ring.bore_mm == 0
     return belt_drive(scanner, envelope) if capsule else direct_drive(scanner, envelope)

@@ -52,9 +52,5 @@ def parts_of(place: Placement) -> list[PartSpec | LeftOut]:
 
 
 def laid_out(scanner: Scanner) -> Layout:
-    """Lay out one scanner with all its parts.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Lay out one scanner with all its parts; BuildError if it cannot be laid out."""
     return layout_of(scanner, parts_of)

@@ -10,9 +10,8 @@ import cadquery as cq
 from scanwright.cad.layout.cables.obstacles import Shape
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
-from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.design.catalogue.product_base import Product
-from scanwright.design.catalogue.products import Printer
+from scanwright.design.catalogue.products import Bearing, Printer
 from scanwright.design.catalogue.servo import Servo
 
 Process = Literal["printed", "turned", "sawn"]
@@ -31,6 +30,36 @@ ON_CASE = ("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm", "servo.
 SEATED = "the hub is on the end of the shaft without a gap, and does not rock when the lidar is pushed sideways"
 BENCH = "Servo on the bench"  # section of `wiring.md`
 TURNED_FROM = "aluminium EN AW-6082-T6"
+
+
+@dataclass(frozen=True, slots=True)
+class ToleratedDiameter:
+    """Diameter of the cylinders of one diameter about the axis of a part's ordinates."""
+
+    diameter: float  # as drawn
+    hole: bool  # whether the material is outside
+    tolerance: str  # text behind the diameter
+    why: str  # its purpose
+
+
+def printed_seat(bearing: Bearing, fit: float) -> ToleratedDiameter:
+    """Return the diameter of a bearing's seat in a printed part, drawn half of the sliding fit wider."""
+    why = f"seat of {bearing.name}, from size for size to a sliding fit"
+    return ToleratedDiameter(bearing.outer_mm + fit / 2, True, f"±{_g(fit / 2)}", why)
+
+
+def no_wider(diameter: float, fit: float, why: str) -> ToleratedDiameter:
+    """Return a printed hole, drawn half of the sliding fit wider, and the reason for its upper limit."""
+    return ToleratedDiameter(diameter + fit / 2, True, f"0/-{_g(fit / 2)}", why)
+
+
+def spigot_in_hub(diameter: float, fit: float) -> ToleratedDiameter:
+    """Return the diameter of a shaft's upper end in the printed hub."""
+    return ToleratedDiameter(diameter, False, f"0/-{_g(fit / 2)}", "half of the fit in the printed hub")
+
+
+def _g(value: float) -> str:
+    return f"{round(value, 3):g}"
 
 
 def to_centre(servo: Servo) -> str:
@@ -80,7 +109,10 @@ class PartSpec:
     material: str = ""  # if it is not printed
     work: str = ""  # further work
     why_metal: str = ""  # why it is not printed
-    sheet: OnSheet = field(default_factory=OnSheet)  # further data of its drawing
+    fits: tuple[ToleratedDiameter, ...] = ()  # of its cylinders, for its drawing
+    notes: tuple[str, ...] = ()  # lines of text of its drawing
+    # of the ordinates of its drawing, in the plane z = 0 of the rotation frame
+    axis: tuple[float, float] = (0.0, 0.0)
     shaped_by: tuple[str, ...] = ()  # fields of products, as "kind.field", that shape it
     # fields that shape something else, with its description; they precede `shaped_by` of any part
     shapes: Mapping[str, str] = field(default_factory=dict)

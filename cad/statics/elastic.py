@@ -14,13 +14,68 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from scanwright.cad.statics.voxels import Grid
 from scanwright.design.arrays import Array, Mask
+from scanwright.design.scene import ray_caster
 
 OUTSIDE = 1e-4  # stiffness of a cut cell's cubes outside the body, of that inside: keeps its nodes in place
 HOLD = 20.0  # stiffness per area of a clamp, of modulus by edge: softens by about 1e-3
 LATTICE = np.array([[i, j, k] for i in range(3) for j in range(3) for k in range(3)])
 NODES = LATTICE[(LATTICE == 1).sum(axis=1) < 2]  # corners and middles of edges, in half edges from the corner, (20, 3)
+RAYS = 2  # through a cube, along x and along y: a wall as thin as a cube keeps its thickness
+SURFACES = 64  # that one column may pass
+PAST_M = 1e-7  # beyond a surface that was hit
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Cubic cells, each of `parts` cubes along an edge."""
+
+    low: Array  # corner of the first cell [mm], shape (3,)
+    edge: float  # of a cell [mm]
+    shape: tuple[int, int, int]  # cells along x, y, z
+    parts: int  # cubes along the edge of a cell
+
+    def middles(self, axis: int) -> Array:
+        """Return middles of the cubes along one axis [mm]."""
+        return self.low[axis] + self.edge * (np.arange(self.shape[axis] * self.parts) + 0.5) / self.parts
+
+
+def filled(triangles: Array, grid: Grid) -> Array:
+    """Return the share of each cube inside a closed surface: exact along z, the mean of RAYS x RAYS lines across it.
+
+    Triangles (t, 3, 3) [mm] are counter-clockwise from outside; the result has shape (nx, ny, nz) * parts.
+    """
+    solid = ray_caster.build_scene(triangles / 1000)
+    below = min(float(grid.low[2]), float(triangles[:, :, 2].min())) - 1.0
+    offsets = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * grid.edge / grid.parts
+    return np.mean([_along_lines(solid, grid, below, dx, dy) for dx in offsets for dy in offsets], axis=0)
+
+
+def _along_lines(solid: ray_caster.Scene, grid: Grid, below: float, dx: float, dy: float) -> Array:
+    """Share of one line through each cube that is inside, its shift from the middle given."""
+    x, y = grid.middles(0) + dx, grid.middles(1) + dy
+    columns = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2).reshape(-1, 2)
+    height = np.full(len(columns), below)
+    cube, levels = grid.edge / grid.parts, grid.shape[2] * grid.parts
+    change = np.zeros((len(columns), levels + 2))
+    left = np.arange(len(columns))
+    for _ in range(SURFACES):
+        origins = np.column_stack([columns[left], height[left]]) / 1000
+        hits = ray_caster.cast(solid, origins, np.broadcast_to([0.0, 0.0, 1.0], origins.shape))
+        met = hits.triangle >= 0
+        left = left[met]
+        if len(left) == 0:
+            break
+        height[left] += 1000 * hits.range_m[met]
+        place = np.clip((height[left] - grid.low[2]) / cube, 0.0, levels)
+        level = np.minimum(place.astype(np.intp), levels - 1)
+        sense = np.where(solid.normals[hits.triangle[met], 2] < 0, 1.0, -1.0)
+        beyond = level + 1.0 - place
+        change[left, level] += sense * beyond
+        change[left, level + 1] += sense * (1.0 - beyond)
+        height[left] += 1000 * PAST_M
+    share = np.clip(np.cumsum(change, axis=1)[:, :levels], 0.0, 1.0)
+    return share.reshape(len(x), len(y), levels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,18 +126,9 @@ def places(model: Model, points: Array) -> Places:
 
 
 def solve(model: Model, modulus: float, poisson: float, clamped: Places, clamped_mm2: float, loads: Array) -> Array:
-    """Return the displacements of all nodes.
+    """Return the displacements of all nodes [mm] by loads (n, 3, cases) [N].
 
-    Args:
-        model: the body.
-        modulus: of elasticity [MPa].
-        poisson: ratio.
-        clamped: points spread evenly over the surface that cannot move.
-        clamped_mm2: its area.
-        loads: [N], shape (n, 3, cases).
-
-    Returns:
-        [mm], of the loads' shape.
+    `clamped` are points spread evenly over the surface that cannot move, whose area is `clamped_mm2`.
 
     Raises:
         RuntimeError: nothing holds the body.

@@ -180,7 +180,7 @@ def catalogue(
     record = Products([product.facts() for product in listed])
     if sketch is not None:
         require_kernel("catalogue --sketch")
-        from scanwright.cad.drawings.devices.sketch import sketch_svg
+        from scanwright.cad.drawings.sketch import sketch_svg
 
         with atomic_write(sketch, TaskError) as place:
             place.write_bytes(sketch_svg(listed[0]))

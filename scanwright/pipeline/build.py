@@ -261,17 +261,17 @@ def _write_and_check(
     shutil.rmtree(work / "parts", ignore_errors=True)
     _, scanner, assembly = attempt
     written = begin(_written, scanner, assembly, work, progress)
-    checked = begin(_checked, scanner, assembly, progress)
+    checked = begin(_checked, assembly, progress)
     parts = written()
     write_files(work, checked())
     return parts, errors_in(read_checks(work / "checks.json"))
 
 
-def _checked(scanner: Scanner, assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
+def _checked(assembly: Packed[Assembly], progress: Progress) -> dict[str, bytes]:
     """Return the files of the checks and the self-occlusion."""
     from scanwright.cad.checks.run import check_files
 
-    return check_files(scanner, assembly.open(), progress)
+    return check_files(assembly.open(), progress)
 
 
 def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progress: Progress) -> PartsMade:
@@ -282,21 +282,20 @@ def _written(scanner: Scanner, assembly: Packed[Assembly], folder: Path, progres
 
 def _exported(
     scanner: Scanner, parts: Packed[PartsResult], folder: Path, progress: Progress
-) -> tuple[tuple[Finding, ...], tuple[LeftOut, ...]]:
+) -> tuple[list[Finding], list[LeftOut]]:
     """Write the files for the workshop except the drawings; returns findings and omissions."""
     from scanwright.cad.files.workshop_files import export_scanner
 
-    exports = export_scanner(scanner, parts.open(), folder, progress)
-    return exports.findings, exports.left_out
+    return export_scanner(scanner, parts.open(), folder, progress)
 
 
-def _drawn(scanner: Scanner, parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
+def _drawn(parts: Packed[PartsResult], progress: Progress) -> dict[str, bytes]:
     """Return the files of the drawings."""
     from scanwright.cad.drawings.files import drawing_files
 
     progress("drawing the parts")
     made = parts.open()
-    return drawing_files(scanner, made.assembly, made.masses_g(), made.assembly.layout.digest)
+    return drawing_files(made.assembly, made.masses_g())
 
 
 def measured(progress: Progress, step: str, fraction: float | None = None, /) -> None:
@@ -336,7 +335,7 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
         add_check(work / "checks.json", height)
         exported, drawn = (
             begin(_exported, scanner, parts.result, work, progress),
-            begin(_drawn, scanner, parts.result, progress),
+            begin(_drawn, parts.result, progress),
         )
         settings = {f"{loaded.task.name}, with parts: J = {best.score.J:.3f}": best.angles_rad}
         settings |= {

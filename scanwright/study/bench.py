@@ -142,7 +142,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
     try:
         assembly = make_parts(scanner)
-        checks, shadow = run_checks(scanner, assembly, no_progress)
+        checks, shadow = run_checks(assembly, no_progress)
     except BuildError as error:
         return Refused(str(error))
     failed = [check.message for check in checks if check.severity == "error"]
@@ -150,7 +150,7 @@ def _made(scanner: Scanner) -> BuiltSetting | Refused:
 
 
 def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Finding], shadow: SelfOcclusion) -> BuiltSetting:
-    from scanwright.cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.assembly import link_bodies
 
     margins = {
         check.code: check.limit / check.value
@@ -160,7 +160,7 @@ def _weighed(scanner: Scanner, assembly: Assembly, checks: Sequence[Finding], sh
     weakest = min(margins, key=lambda kind: margins[kind], default="")
     ring = () if scanner.slip_ring is None else (scanner.slip_ring,)
     values = {
-        "mass_g": 1000 * sum(body.mass_kg for body in link_bodies(scanner, assembly).values()),
+        "mass_g": 1000 * sum(body.mass_kg for body in link_bodies(assembly).values()),
         "load_margin": margins.get(weakest),
         "deflection_deg": next((check.value for check in checks if check.code == BENDS), None),
         "cost_usd": price_usd([scanner.lidar, scanner.servo, *ring, *assembly.layout.drive.products]),

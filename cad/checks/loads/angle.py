@@ -4,34 +4,29 @@ import math
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import LIDAR_CENTRE_ERROR_MM
-from scanwright.cad.checks.limits import at_least, figures
+from scanwright.cad.assembly.assembly import LIDAR_CENTRE_ERROR_MM, Assembly
 from scanwright.cad.checks.loads.retention import hanging_on, material_of, together_of
-from scanwright.cad.checks.table import HELD_G, LEAST_MARGIN
+from scanwright.cad.checks.table import at_least, figures
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import friction_nm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, cross_seat_mm
-from scanwright.cad.layout.tightening import hold_of
+from scanwright.cad.layout.tightening import FRICTION, HELD_G, LEAST_MARGIN, hold_of
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
-from scanwright.design.scanner import Scanner
-
-FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of measured values
 
 
-def angle_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
+def angle_checks(assembly: Assembly) -> list[Finding]:
     """Check the friction of hub on shaft against HELD_G on the imbalance and the drag of the ring.
 
     The screws press the hub's bore onto the shaft, with the preload that creep leaves (`tightening.PRINTED`). Friction
     under their heads is neglected.
     """
-    layout = assembly.layout
+    layout, scanner = assembly.layout, assembly.layout.scanner
     joint = next(each for each in layout.joints if (each.part, each.onto) == (ALIGNMENT_LINKAGE, layout.drive.shaft))
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     assert hold is not None
-    body = together_of(scanner, assembly, hanging_on(assembly, joint))
+    body = together_of(assembly, hanging_on(assembly, joint))
     imbalance = body.mass_kg * math.hypot(*body.centre_m[:2]) + scanner.lidar.mass_g * LIDAR_CENTRE_ERROR_MM * 1e-6
     turns = HELD_G * STANDARD_GRAVITY_M_S2 * imbalance + friction_nm(scanner)[1]
     pressed = hold.preload_n * float(np.linalg.norm(np.sum([axis.along for axis in joint.axes], axis=0)))

@@ -13,15 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanwright.cad.assembly.assembly import Assembly
-from scanwright.cad.assembly.masses import lidar_body
-from scanwright.cad.checks.limits import at_least, tidy
-from scanwright.cad.checks.table import LEAST_MARGIN
+from scanwright.cad.assembly.assembly import Assembly, lidar_body
+from scanwright.cad.checks.table import at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.loads import SHOCK_G, Weight
+from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import (
     BEARING_CAGE,
     DECK,
@@ -32,19 +30,29 @@ from scanwright.cad.layout.names import (
     SERVO_OUTPUT,
     TRIPOD,
 )
-from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.cad.layout.tightening import (
+    ALUMINIUM,
+    BOUGHT,
+    LEAST_MARGIN,
+    MOULDED,
+    PRINTED,
+    SHOCK_G,
+    STEEL,
+    Hold,
+    Material,
+    hold_of,
+)
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
-from scanwright.design.scanner import Scanner
 
 ROUNDING_MM = 1e-6  # a thread that limits the preload engages by just the required length
 AXIAL_COS = 0.9  # to the rotation axis, above which a screw does not point at it
 
 
-def retention_checks(scanner: Scanner, assembly: Assembly) -> list[Finding]:
+def retention_checks(assembly: Assembly) -> list[Finding]:
     """Check margin and thread engagement of each joint."""
-    return [check for joint in assembly.layout.joints for check in _of_joint(scanner, assembly, joint)]
+    return [check for joint in assembly.layout.joints for check in _of_joint(assembly, joint)]
 
 
 def material_of(assembly: Assembly, body: str) -> Material:
@@ -77,7 +85,7 @@ def hanging_on(assembly: Assembly, joint: Joint) -> frozenset[str]:
     return frozenset(everything - reached)
 
 
-def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Finding]:
+def _of_joint(assembly: Assembly, joint: Joint) -> Iterator[Finding]:
     both, hanging = f"{joint.part} on {joint.onto}", hanging_on(assembly, joint)
     subject = f"{joint.part} and {joint.onto}"  # as the pictures of a report name them
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
@@ -90,16 +98,16 @@ def _of_joint(scanner: Scanner, assembly: Assembly, joint: Joint) -> Iterator[Fi
     if bare and carries and joint.onto in assembly.parts:
         message = f"{both}: the lidar hangs on threads in bare plastic, which creeps"
         yield Finding("retention", "error", subject, message)
-    yield _margin(scanner, assembly, joint, hold, hanging)
+    yield _margin(assembly, joint, hold, hanging)
     yield _screws(joint, hold, subject)
 
 
-def _margin(scanner: Scanner, assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
-    body = together_of(scanner, assembly, hanging)
+def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
+    body = together_of(assembly, hanging)
     force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
     shaft, cage, brace = assembly.layout.drive.shaft, assembly.layout.drive.of(BearingCage), None
     if cage is not None and (shaft in hanging) != (BEARING_CAGE in hanging):
-        at, carried_kg = _borne(scanner, assembly, cage)
+        at, carried_kg = _borne(assembly, cage)
         brace = at, (-carried_kg if shaft in hanging else carried_kg) / body.mass_kg
     pull, push = worst_shares(joint, body.centre_m, brace)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
@@ -124,24 +132,24 @@ def _screws(joint: Joint, hold: Hold, subject: str) -> Finding:
     return Finding("screw", "ok" if engaged else "error", subject, message, value, limit, "mm")
 
 
-def together_of(scanner: Scanner, assembly: Assembly, names: frozenset[str]) -> Inertial:
+def together_of(assembly: Assembly, names: frozenset[str]) -> Inertial:
     """Return parts and products as one body; a product of which half turns counts in full on either side."""
     bodies = [assembly.inertial(name) for name in sorted(names & assembly.made.keys())]
     for each, mass_g, box in assembly.layout.drive.masses:
         if each.name in names or (each.turning > 0 and assembly.layout.drive.shaft in names):
-            bodies.append(inertia.of_box(mass_g, box.low, box.high))
+            bodies.append(inertia.of_box(mass_g, *box))
     if LIDAR in names:
-        bodies.append(lidar_body(scanner.lidar).moved(scanner.angles.T_rot_laser()))
+        bodies.append(lidar_body(assembly.layout.scanner.lidar).moved(assembly.layout.scanner.angles.T_rot_laser()))
     return inertia.together(bodies)
 
 
-def _borne(scanner: Scanner, assembly: Assembly, cage: BearingCage) -> tuple[Array, float]:
+def _borne(assembly: Assembly, cage: BearingCage) -> tuple[Array, float]:
     """Return the middle of the bearing [m], shape (3,), and the mass [kg] that it carries across the axis."""
     stack = cage.stack
     horn = next(each for each in assembly.layout.joints if (each.part, each.onto) == (stack.shaft, SERVO_HORN))
-    rotor = together_of(scanner, assembly, hanging_on(assembly, horn))
+    rotor = together_of(assembly, hanging_on(assembly, horn))
     across = Weight(rotor.mass_kg, 0.0, float(rotor.centre_m[2]) - stack.horn / 1000, 0.0)
-    carried = share_weight(scanner, stack, cage, across).bearing_force_n
+    carried = share_weight(assembly.layout.scanner, stack, cage, across).bearing_force_n
     return np.array([0.0, 0.0, stack.bearing_middle / 1000]), carried
 
 

@@ -16,7 +16,6 @@ from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import WITH_CALIPER, measure_first
 from scanwright.design.electrics.wiring import network_of, uart_adapter
-from scanwright.design.scanner import Scanner
 
 NUTS = (
     "Put the nuts into their pockets first: those of a plate or an arm from below; those of a boss from above into the "
@@ -35,17 +34,17 @@ THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, t
 IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to {port} and power."
 
 
-def instructions_text(
-    scanner: Scanner, assembly: Assembly, scenes: Sequence[StepScene], plates: Sequence[Sequence[str]], config_hash: str
-) -> str:
-    """Return the Markdown file; scenes of `scenes.scenes_of`, `plates` are the parts printed together."""
+def instructions_text(assembly: Assembly, scenes: Sequence[StepScene], plates: Sequence[Sequence[str]]) -> str:
+    """Return the Markdown file; scenes of `scenes_of`, `plates` are the parts printed together."""
+    scanner = assembly.layout.scanner
     joints = [joint for scene in scenes for joint, _ in scene.joints]
     angles = scanner.angles.angles_deg
     lines = [
         f"# {scanner.angles.task}: putting it together",
         "",
-        f"Configuration {config_hash}: {scanner.lidar.name} on {scanner.servo.name}, alpha_rot {angles.alpha_rot:g}, "
-        f"beta_rot {angles.beta_rot:g}, alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
+        f"Configuration {assembly.layout.digest}: {scanner.lidar.name} on {scanner.servo.name}, "
+        f"alpha_rot {angles.alpha_rot:g}, beta_rot {angles.beta_rot:g}, "
+        f"alpha_laser {angles.alpha_laser:g}, beta_laser {angles.beta_laser:g} deg. "
         "In the pictures present bodies are grey, new made parts orange, new bought ones blue; the rotation axis is "
         "upright, or the lidar's axis if the step is on the bench. `exploded.glb` shows the scanner in 3D; `bom.csv` "
         "lists all items.",
@@ -136,18 +135,11 @@ def torque_in_words(assembly: Assembly, joint: Joint) -> str:
     return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
 
 
-def step_files(
-    scanner: Scanner,
-    assembly: Assembly,
-    meshes: dict[str, TriMesh],
-    joints: Sequence[Joint],
-    plates: Sequence[Sequence[str]],
-    config_hash: str,
-) -> dict[str, bytes]:
+def step_files(assembly: Assembly, meshes: dict[str, TriMesh], plates: Sequence[Sequence[str]]) -> dict[str, bytes]:
     """Return `assembly.md` and the picture of each step; `meshes` of the made parts have their labels."""
-    scenes = scenes_of(assembly, joints)
+    scenes = scenes_of(assembly)
     pictures = StepPictures(assembly.meshes() | meshes, frozenset(assembly.made))
-    files = {"assembly.md": instructions_text(scanner, assembly, scenes, plates, config_hash).encode("utf-8")}
+    files = {"assembly.md": instructions_text(assembly, scenes, plates).encode("utf-8")}
     for number, scene in enumerate(scenes, start=1):
         torques = [torque_in_words(assembly, joint) for joint, _ in scene.joints]
         files[picture_name(number)] = pictures.picture(scene, torques)

@@ -2,13 +2,11 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_limits, belt_shaft_bend
-from scanwright.cad.layout.belt.plate import THIN_GAP, plate_of, pulley_foot_radius
 from scanwright.cad.layout.belt.sizing import belt_stack
 from scanwright.cad.layout.belt.stack import (
     BOSS,
@@ -19,28 +17,23 @@ from scanwright.cad.layout.belt.stack import (
     FOOT_SCREW,
     PLATE,
     SHELF,
+    THIN_GAP,
+    UNDER_FOOT_NUT,
     BeltStack,
     case_corners,
     drive_corners,
+    plate_of,
+    pulley_foot_radius,
+    shelf_corners,
+    tower_corners,
+    tower_foot_of,
 )
-from scanwright.cad.layout.belt.tower import UNDER_FOOT_NUT, shelf_corners, tower_corners, tower_foot_of
-from scanwright.cad.layout.drive import (
-    Body,
-    Bundle,
-    Cuboid,
-    DriveLayout,
-    LeadExit,
-    Mounted,
-    Rod,
-    Station,
-    StatorExit,
-    servo_limit,
-)
-from scanwright.cad.layout.envelope import Envelope, box_corners
+from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit, servo_limit
+from scanwright.cad.layout.envelope import Box, Envelope, box_corners
 from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
+from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import Thread
-from scanwright.design.arrays import Array
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
@@ -65,11 +58,7 @@ BUILT = (
 
 
 def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """Return the drive of a scanner with a capsule ring.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Return the drive of a scanner with a capsule ring."""
     stack, ring = belt_stack(scanner, envelope), scanner.slip_ring
     assert ring is not None
     plate, mounted = plate_of(scanner), _mounted(stack, tower_foot_of(scanner.printer, stack))
@@ -105,67 +94,41 @@ def _bears(_bar_g: float, _bar_z: float) -> bool:
 
 
 def _stations(stack: BeltStack, ring: SlipRing) -> Iterator[Station]:
-    def round_one(name: str, body: Body, radius: float, low: float, high: float) -> Station:
-        return Station(name=name, body=body, z_mm=(low, high), radius_mm=radius)
-
-    def bearing(place: Literal["_upper", "_lower"], low: float, high: float, middle: float) -> Station:
-        half = stack.carrier.width_mm / 2
-        rod = Rod(stack.carrier.outer_mm / 2, middle - half, middle + half)
-        return Station(
-            name=names.BEARING,
-            body="base",
-            place=place,
-            z_mm=(low, high),
-            radius_mm=rod.radius,
-            product=stack.carrier,
-            box=rod.cuboid(),
-            turning=0.5,
-        )
-
-    corners = case_corners(stack)
-    case = _cuboid(corners.min(axis=0), corners.max(axis=0))
-    capsule = Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top)
-    yield round_one(names.SLIP_RING_ADAPTER, "base", stack.chamber_radius, stack.disc_top - DISC, stack.disc_top)
+    corners, width = case_corners(stack), stack.carrier.width_mm
+    case = triple(corners.min(axis=0)), triple(corners.max(axis=0))
+    disc, low = (stack.disc_top - DISC, stack.disc_top), stack.collar_low
+    yield Station(names.SLIP_RING_ADAPTER, "base", disc, stack.chamber_radius)
+    yield Station.half_turning(ring, Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
+    yield Station(names.SHAFT_RING, "rotor", (low, low + BOSS + BEARING_STEP), stack.boss_radius)
+    yield Station(names.BEARING_TOWER, "base", (stack.tower_bottom, stack.tower_top), stack.wide_radius)
+    upper = Rod(stack.carrier.outer_mm / 2, stack.tower_top - width, stack.tower_top)
+    yield Station.half_turning(stack.carrier, upper, "_upper")
+    lower = Rod(stack.carrier.outer_mm / 2, stack.lower_bottom, stack.lower_bottom + width)
+    yield Station.half_turning(stack.carrier, lower, "_lower")
+    yield Station(names.MAIN_SHAFT, "rotor", (stack.shaft_bottom, stack.spigot_top), stack.collar_radius)
     yield Station(
-        name=names.RING,
-        body="base",
-        z_mm=(capsule.low, capsule.high),
-        radius_mm=capsule.radius,
-        product=ring,
-        box=capsule.cuboid(),
-        turning=0.5,
-        shape=capsule,
-    )
-    low = stack.collar_low
-    yield round_one(names.SHAFT_RING, "rotor", stack.boss_radius, low, low + BOSS + BEARING_STEP)
-    yield round_one(names.BEARING_TOWER, "base", stack.wide_radius, stack.tower_bottom, stack.tower_top)
-    width = stack.carrier.width_mm
-    yield bearing("_upper", stack.tower_top - width, stack.tower_top, stack.upper_middle)
-    yield bearing("_lower", stack.lower_bottom, stack.lower_bottom + width, stack.lower_middle)
-    yield round_one(names.MAIN_SHAFT, "rotor", stack.collar_radius, stack.shaft_bottom, stack.spigot_top)
-    yield Station(
-        name=names.SERVO,
-        body="base",
-        z_mm=(case.low[2], case.high[2]),
-        radius_mm=max(*map(abs, stack.servo.case_min_mm[:2]), *stack.servo.case_max_mm[:2]),
+        names.SERVO,
+        "base",
+        (case[0][2], case[1][2]),
+        max(*map(abs, stack.servo.case_min_mm[:2]), *stack.servo.case_max_mm[:2]),
         product=stack.servo,
         box=case,
         shape=case,
     )
-    yield round_one(names.DRIVE_PLATE, "base", stack.plate_x, stack.tower_top, stack.tower_top + PLATE)
-    yield round_one(names.DRIVE_PULLEY, "horn", stack.rim_radius, stack.horn, stack.teeth_top)
+    yield Station(names.DRIVE_PLATE, "base", (stack.tower_top, stack.tower_top + PLATE), stack.plate_x)
+    yield Station(names.DRIVE_PULLEY, "horn", (stack.horn, stack.teeth_top), stack.rim_radius)
     half = stack.belt.width_mm / 2
     yield Station(
-        name=names.BELT,
-        body="rotor",
-        z_mm=(stack.belt_middle - half, stack.belt_middle + half),
-        radius_mm=stack.belt_radius,
+        names.BELT,
+        "rotor",
+        (stack.belt_middle - half, stack.belt_middle + half),
+        stack.belt_radius,
         product=stack.belt,
         box=_around_belt(stack),
         order=f"{stack.belt.name}, {stack.belt_teeth} teeth, {stack.belt_teeth * stack.belt.pitch_mm:g} mm",
     )
-    yield round_one(names.SHAFT_PULLEY, "rotor", stack.rim_radius, stack.teeth_low, stack.pulley_top)
-    yield round_one(names.ALIGNMENT_LINKAGE, "rotor", stack.hub_radius, stack.shoulder, -stack.h)
+    yield Station(names.SHAFT_PULLEY, "rotor", (stack.teeth_low, stack.pulley_top), stack.rim_radius)
+    yield Station(names.ALIGNMENT_LINKAGE, "rotor", (stack.shoulder, -stack.h), stack.hub_radius)
 
 
 def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
@@ -198,14 +161,9 @@ def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth:
     yield tie, tuple(ends)
 
 
-def _around_belt(stack: BeltStack) -> Cuboid:
+def _around_belt(stack: BeltStack) -> Box:
     corner = stack.turn() @ [stack.centre + stack.belt_radius, stack.belt_radius, 0.0]
     start = stack.turn() @ [-stack.belt_radius, -stack.belt_radius, 0.0]
     width = np.array([0.0, 0.0, stack.belt.width_mm / 2])
     middle = np.array([0.0, 0.0, stack.belt_middle])
-    return _cuboid(np.minimum(corner, start) + middle - width, np.maximum(corner, start) + middle + width)
-
-
-def _cuboid(low: Array, high: Array) -> Cuboid:
-    (x0, y0, z0), (x1, y1, z1) = low.tolist(), high.tolist()
-    return Cuboid((x0, y0, z0), (x1, y1, z1))
+    return triple(np.minimum(corner, start) + middle - width), triple(np.maximum(corner, start) + middle + width)

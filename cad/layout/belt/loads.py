@@ -91,12 +91,6 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
     )
 
 
-def run_out_rad(stack: BeltStack, fit_mm: float) -> float:
-    """Return the amplitude of the angle error, once per turn: each pulley is off its axis by half of its fit."""
-    off = 2 * fit_mm / 4
-    return off / stack.pitch_radius
-
-
 def press_newton(stack: BeltStack, strand_n: float, give_mm: float) -> float:
     """Return the force in the middle of a strand that moves it by `give_mm`: a test of its pre-load."""
     return 4 * strand_n * give_mm / stack.centre

@@ -4,23 +4,24 @@ Their exits are assumed, as the catalogue states. They end tied to a side of the
 the servo. Rotation frame at gamma = 0, mm.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scanwright.cad.layout.cables.fixed_space import FixedSpace, fixed_space_of
 from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
-from scanwright.cad.layout.cables.obstacles import Shape
-from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.route import Ending, short_path
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
-from scanwright.cad.layout.drive import Mounted
+from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
+from scanwright.cad.layout.cables.route import Ending, Path, short_path
+from scanwright.cad.layout.deck import Deck
+from scanwright.cad.layout.drive import Mounted, Rod
+from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 from scanwright.cad.layout.placement import Placement
-from scanwright.design.arrays import Array
+from scanwright.design.arrays import Array, Mask
 
 LEAVES = (6.5, 8.0, 11.0, 16.0, 24.0)  # from its device to the first bend
 ON_FOOT = 1.0  # between foot or deck and a cable on it
@@ -32,6 +33,30 @@ AROUND = 20.0  # of the lattice beyond the ends
 FROM_CASE = 24.0  # from the case to the end of a cable on a flat deck
 THROUGH_DECK = 15.0
 FROM_SLOT = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class FixedSpace:
+    """Space for a cable that does not turn."""
+
+    shapes: tuple[Shape, ...]  # convex shapes to avoid
+    ceiling: float  # height below all that turns
+    deck: Deck  # that it lies on
+    others: tuple[Array, float]  # middles of earlier cables, shape (n, 3), and the largest radius of one
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
+        apart = half + gap
+        over_deck = (points - np.array(self.deck.centre)) @ np.array(self.deck.normal)
+        clear = (points[:, 2] < self.ceiling - apart) & (over_deck > half)
+        middles, radius = self.others
+        left = np.flatnonzero(clear)
+        clear[left] = clear_of(self.shapes, points[left], apart) & farther(points[left], middles, radius + apart)
+        return np.asarray(clear)
+
+    def with_cable(self, middles: Array, radius: float) -> FixedSpace:
+        """Return the space that a cable leaves."""
+        return replace(self, others=(np.concatenate([middles, self.others[0]]), max(radius, self.others[1])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +91,13 @@ class Leaving:
 
 def fixed_cables_of(place: Placement, avoid: Iterable[Shape]) -> tuple[FixedCable, ...]:
     """Return the cables that the catalogue describes, clear of the shapes to avoid."""
-    space, cables = fixed_space_of(place, avoid), []
+    products = [
+        around_axis(shape.radius, shape.low, shape.high) if isinstance(shape, Rod) else box_corners(shape)
+        for shape in (station.shape for station in place.drive.stations)
+        if shape is not None
+    ]
+    shapes = (*map(shape_of, products), *avoid)
+    space, cables = FixedSpace(shapes, place.drive.ceiling, place.deck, (np.zeros((0, 3)), 0.0)), []
     for lane, leaving in enumerate(_leaving(place)):
         path = _path(place, space, leaving, lane)
         cables.append(FixedCable(leaving.name, leaving.device, leaving.diameter, leaving.radius, path))
@@ -115,7 +146,7 @@ def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
     ends = []
     for seat in deck.ties:
         aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
-        z = np.array([FOOT_THICKNESS + half + ON_FOOT])
+        z = np.array([deck.foot_mm + half + ON_FOOT])
         (end,) = seat.points(np.array([seat.end + BEYOND]), np.array([aside]), z) @ deck.rotation().T + np.array(
             deck.centre
         )

@@ -5,29 +5,180 @@ in a joint. Both turn with the lidar and do not flex.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from scanwright.cad.layout.cables import joint as joints
-from scanwright.cad.layout.cables.joint import LeadJoint, joint_of
-from scanwright.cad.layout.cables.obstacles import Shape
-from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.rotor_space import RotorSpace, rotor_space_of
-from scanwright.cad.layout.cables.route import Ending, lattice_about_axis, short_path
+from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
+from scanwright.cad.layout.cables.route import GAP, CableSpace, Ending, Path, PathPiece, lattice_about_axis, short_path
+from scanwright.cad.layout.deck import Deck
+from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Bundle
+from scanwright.cad.layout.envelope import Box, around_axis, box_corners
 from scanwright.cad.layout.hub import BUNDLE_GAP
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.tie_seat import TieSeat
-from scanwright.design.arrays import Array
+from scanwright.design.arrays import Array, Mask
+from scanwright.design.catalogue.lidar import Lidar
 
 SAMPLE = 1.5  # mm between the points of a lead
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
 LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.9 g/m each, in a bundle of 3.5 mm
+BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, and it widens
+JOINT_LENGTH = 12.0  # crimps side by side, and a shrink tube over them
+TUBE_WALL = 0.5  # of the shrink tube; a tenth of the gap to other leads remains
+JOINT_STEP = 3.0  # between two tested places, and two points of a joint
+
+
+@dataclass(frozen=True, slots=True)
+class LeadJoint:
+    """The piece of a path with the joint of `JOINT_LENGTH`, and the offset from the middle of the piece."""
+
+    piece: PathPiece
+    off: float
+
+    @property
+    def along(self) -> Array:
+        """Its direction, shape (3,)."""
+        return np.asarray((self.piece.end - self.piece.start) / self.piece.length)
+
+    @property
+    def middle(self) -> Array:
+        """Shape (3,)."""
+        return self.piece.middle + self.off * self.along
+
+    def points(self) -> Array:
+        """Return points from one end to the other, shape (n, 3)."""
+        return np.asarray(
+            self.middle
+            + np.arange(-JOINT_LENGTH / 2, JOINT_LENGTH / 2 + JOINT_STEP / 2, JOINT_STEP)[:, None] * self.along
+        )
+
+
+def joint_of(path: Path, half: float, space: CableSpace, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
+    """Return the joint of a lead with radius `half`; None if no straight piece is long enough.
+
+    `others` are middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
+    """
+    places = [place for piece in straights(path) for place in _places(piece)]
+    for place in places:
+        points = place.points()
+        if space.free(points, half + TUBE_WALL, GAP - TUBE_WALL).all() and all(
+            farther(points, *other).all() for other in others
+        ):
+            return place
+    return places[0] if places else None  # the check of clearances then fails
+
+
+def straights(path: Path) -> list[PathPiece]:
+    """Return the straight pieces behind the first bend, the longest first."""
+    pieces = path.pieces()
+    bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
+    return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
+
+
+def _places(piece: PathPiece) -> list[LeadJoint]:
+    """Return joints from the middle of a piece to its ends."""
+    most = (piece.length - JOINT_LENGTH) / 2
+    steps = np.linspace(0.0, most, math.ceil(most / JOINT_STEP) + 1).tolist() if most >= 0 else []
+    return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]
+
+
+@dataclass(frozen=True, slots=True)
+class RotorSpace:
+    """Space for a lead on the rotor."""
+
+    shapes: tuple[Shape, ...]  # convex shapes that turn
+    channels: tuple[Box, ...]  # cut from the neck, from their lower ends upwards, in the laser frame
+    R_rot_laser: Array  # shape (3, 3)
+    bearings_rad: tuple[float, float] | None  # first and last beam; None if a lead may be in the fan
+    hidden_half_angle: float  # of the cone about -z in which all beams are hidden [rad]
+    floor: float  # height of all that does not turn under the rotor
+    deck: Deck  # that the rotor turns over
+    others: tuple[Array, float]  # middles of earlier leads, shape (n, 3), and the distance from them
+
+    def free(self, points: Array, half: float, gap: float) -> Mask:
+        """Return whether a ball of radius `half` at each point (n, 3) keeps `gap` to everything, shape (n,)."""
+        apart = half + gap
+        clear = (points[:, 2] > self.floor + apart) & self._over_deck(points, apart)
+        for is_clear in (  # the cheapest first, and of what is left only
+            lambda some: ~self._in_fan(some, apart),
+            lambda some: clear_of(self.shapes, some, apart, lambda inside: self._carved(inside, apart)),
+            self.clear_of_others,
+        ):
+            left = np.flatnonzero(clear)
+            clear[left] = is_clear(points[left])
+        return np.asarray(clear)
+
+    def clear_of_others(self, points: Array) -> Mask:
+        """Return whether each point, shape (n, 3), is far enough from earlier leads, shape (n,)."""
+        return farther(points, *self.others)
+
+    def _carved(self, points: Array, apart: float) -> Mask:
+        """Return whether points are in the linkage's channels for the cables and for inserting the lidar."""
+        at = points @ self.R_rot_laser
+        inside = [
+            (at > np.array(low) + apart).all(axis=1) & (at[:, :2] < np.array(high[:2]) - apart).all(axis=1)
+            for low, high in self.channels
+        ]
+        return np.asarray(np.any(inside, axis=0))
+
+    def _over_deck(self, points: Array, apart: float) -> Mask:
+        """Return whether points are over the foot of the mount in every position of the turn."""
+        normal = np.array(self.deck.normal)
+        lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > self.deck.foot_mm + apart)
+
+    def _in_fan(self, points: Array, half: float) -> Mask:
+        """Return whether a lead at points would meet a beam; both turn together."""
+        if self.bearings_rad is None:
+            return np.zeros(len(points), dtype=bool)
+        x, y, z = (points @ self.R_rot_laser).T
+        wide = (half + BEAM) / np.maximum(np.hypot(x, y), half + BEAM)
+        first, last = self.bearings_rad
+        bearing = (np.arctan2(y, x) - first + wide) % (2 * math.pi)
+        distance = np.linalg.norm(points, axis=1)
+        polar = np.arccos(np.clip(-points[:, 2] / distance, -1.0, 1.0)) + np.arcsin(np.minimum(1.0, half / distance))
+        near = (np.abs(z) < half + BEAM) & (bearing < last - first + 2 * wide)
+        return np.asarray(near & (polar > self.hidden_half_angle))
+
+
+def rotor_space_of(place: Placement, avoid: Iterable[Shape]) -> RotorSpace:
+    """Return the space on the rotor of one scanner, without leads; `avoid` are shapes of parts that turn."""
+    stack, envelope, lidar = place.stack, place.drive.envelope, place.scanner.lidar
+    R, sub_plate = stack.R(), stack.sub_plate
+    boxes = (envelope.body, envelope.plate(sub_plate), envelope.under(sub_plate), *_stubs(lidar))
+    bearings = lidar.bearings_rad()
+    return RotorSpace(
+        shapes=(*(shape_of(box_corners(box) @ R.T) for box in boxes), *_round(place), *avoid),
+        channels=envelope.cables,
+        R_rot_laser=R,
+        bearings_rad=(float(bearings.min()), float(bearings.max())),
+        hidden_half_angle=stack.sure_half_angle,
+        floor=place.drive.floor,
+        deck=place.deck,
+        others=(np.zeros((0, 3)), 0.0),
+    )
+
+
+def _round(place: Placement) -> Iterator[Shape]:
+    """Yield the shaft below the hub, and the rotor of a ring around it."""
+    stack, direct, ring = place.stack, place.drive.of(DirectStack), place.scanner.slip_ring
+    yield shape_of(around_axis(stack.shaft_diameter / 2, place.drive.floor, stack.shoulder))
+    if direct is not None and ring is not None and ring.rotor is not None:
+        yield shape_of(around_axis(ring.rotor.diameter_mm / 2, direct.ring_top, direct.ring_top + ring.rotor.length_mm))
+
+
+def _stubs(lidar: Lidar) -> list[Box]:
+    """Return the straight pieces of its cables, in the laser frame."""
+    half, back, z = lidar.cable_diameter_mm / 2, -lidar.body_mm[0] / 2, lidar.cable_z_mm - lidar.optical_height_mm
+    return [
+        ((back - lidar.cable_straight_mm, y - half, z - half), (back, y + half, z + half)) for y in lidar.cable_y_mm
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +230,9 @@ def _jointed(space: RotorSpace, leads: tuple[RotorLead, ...]) -> tuple[RotorLead
     points = [np.zeros((0, 3)) if lead.path is None else lead.path.points(SAMPLE) for lead in leads]
     jointed: list[RotorLead] = []
     for i, lead in enumerate(leads):
-        apart = lead.diameter + joints.WALL + BUNDLE_GAP / 2
+        apart = lead.diameter + TUBE_WALL + BUNDLE_GAP / 2
         others = [(middles, apart) for k, middles in enumerate(points) if k != i]
-        others += [(other.joint.points(), apart + joints.WALL) for other in jointed if other.joint is not None]
+        others += [(other.joint.points(), apart + TUBE_WALL) for other in jointed if other.joint is not None]
         joint = None if lead.path is None else joint_of(lead.path, lead.diameter / 2, space, others)
         jointed.append(replace(lead, joint=joint))
     return tuple(jointed)

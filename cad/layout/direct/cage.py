@@ -1,4 +1,4 @@
-"""Numbers of the bearing's cage: its base on the servo's ears, and its stiffness. No kernel."""
+"""Numbers of the plates on the servo's ears: the base of a bearing's cage, the fork of a ring's adapter. No kernel."""
 
 import math
 from dataclasses import dataclass
@@ -10,9 +10,10 @@ from scanwright.cad.layout.direct.loads import Supported, hanging, shaft_modulus
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears, ears_on
 from scanwright.cad.layout.loads import Weight
-from scanwright.cad.layout.names import CAGE_BASE
+from scanwright.cad.layout.names import CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.screws import SCREWS, Thread, Trap, passing_hole, thread_in_part
 from scanwright.design.catalogue.products import Bearing
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
@@ -23,8 +24,6 @@ FOOT_RADIUS = 3.0
 UNDER_HEAD = 3.0  # of the plate
 CAGE_SCREW = SCREWS["M3"]
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
-UNDER_CAGE_HEAD = 3.5  # of a leg
-TRAP_WALL = 3.0  # of the boss outside a nut
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
 TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
 PLUG_PLAY = 1.0  # clearance around a plug in a hole
@@ -179,3 +178,41 @@ def share_weight(scanner: Scanner, stack: DirectStack, cage: BearingCage | None,
     if cage is None:
         return hanging(weight, stack, shaft_modulus_pa(scanner, stack))
     return supported(weight, stack, stiffness_n_per_m(stack, cage.ears))
+
+
+def adapter_of(scanner: Scanner, stack: DirectStack) -> Ears | None:
+    """Return the holes for the fork of one scanner; None without a ring, or if the base of a cage carries the arms.
+
+    Raises:
+        BuildError: the case has no four holes behind the turning flange, and no frame.
+    """
+    if scanner.slip_ring is None or stack.bearing is not None:
+        return None
+    servo = scanner.servo
+    if needs_frame(servo):
+        return frame_ears(scanner, _opening(stack), fork=True)
+    holes = fork_holes(servo, stack)
+    if not holes:
+        caution = servo.caution("holes")
+        raise BuildError(
+            f"{SLIP_RING_ADAPTER}: fork: holes = {list(servo.front.places)} in front{caution}: {servo.name} needs two "
+            f"pairs of front holes at y < {_behind(stack):g}, behind the turning flange"
+        )
+    return ears_on(scanner, _opening(stack), holes)
+
+
+def fork_holes(servo: Servo, stack: DirectStack) -> tuple[tuple[float, float], ...]:
+    """Return the nearest and the furthest pair of front holes behind the turning flange; none without two pairs."""
+    behind = sorted({y for _, y in servo.front.places if y < _behind(stack)}, reverse=True)
+    rows = [sorted(hole for hole in servo.front.places if hole[1] == y) for y in behind]
+    widest = max((row[-1][0] for row in rows), default=0.0)
+    rows = [row for row in rows if len(row) == 2 and row[-1][0] == widest]
+    return (*rows[0], *rows[-1]) if len(rows) > 1 else ()
+
+
+def _opening(stack: DirectStack) -> float:
+    return stack.flange_radius + 1.5
+
+
+def _behind(stack: DirectStack) -> float:
+    return 2.0 - FOOT_RADIUS - _opening(stack)

@@ -6,25 +6,29 @@ from functools import partial
 import numpy as np
 
 from scanwright.cad.layout import names
-from scanwright.cad.layout.direct.adapter import adapter_of
-from scanwright.cad.layout.direct.cage import BearingCage, cage_of, stiffness_n_per_m
-from scanwright.cad.layout.direct.frame import (
-    FOOT,
-    FOOT_SCREW,
-    ServoFrame,
-    corner_holes,
-    frame_of,
-    needs_frame,
-)
-from scanwright.cad.layout.direct.lead_exits import lead_exits, stator_exit
+from scanwright.cad.layout.direct.cage import BearingCage, adapter_of, cage_of, stator_leads_y, stiffness_n_per_m
+from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, corner_holes, frame_of, needs_frame
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
-from scanwright.cad.layout.direct.stack import DirectStack
-from scanwright.cad.layout.drive import Cuboid, DriveLayout, Mounted, Rod, Station, servo_limit
+from scanwright.cad.layout.direct.stack import BELOW_HUB, DirectStack
+from scanwright.cad.layout.drive import (
+    Bundle,
+    DriveLayout,
+    LeadExit,
+    Mounted,
+    Rod,
+    Station,
+    StatorExit,
+    servo_limit,
+    towards,
+)
 from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
+from scanwright.cad.layout.hub import BUNDLE_GAP
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
+from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
+from scanwright.design.arrays import Array
 from scanwright.design.catalogue.holes import what_holds
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
@@ -51,14 +55,37 @@ BUILT = (
 )
 ADAPTER_ARMS = 8.0  # beyond the ring
 CAGE_HEADS = 4.0  # of the screws of the cage, beyond it
+AROUND_DEG = 15.0  # between two azimuths that a ring's lead may leave at
+
+
+def lead_exits(stack: DirectStack, bundle: Bundle, tie: TieSeat | None, free_azimuth: float) -> Iterator[LeadExit]:
+    """Yield paths by the channel of a bearing's sleeve; without a bearing below the hub's tab, else all around."""
+    half, low = bundle.half, stack.leads_low
+    aside = (2 * half + BUNDLE_GAP) * (bundle.number - (bundle.count - 1) / 2)
+    if stack.bearing is not None:
+        yield tie, (_upwards(stack.leads_radius, aside, low, stack.leads_corner, free_azimuth),)
+        return
+    inner = stack.ring_bore / 2 + half + BUNDLE_GAP  # on the rotor of the ring
+    if tie is not None:
+        high = max(low + bundle.radius, tie.low - BELOW_HUB - half)
+        yield tie, (_upwards(inner, aside, low, high, tie.azimuth),)
+    around = np.radians(np.arange(0.0, 360.0, AROUND_DEG)).tolist()
+    yield None, tuple(_upwards(inner, 0.0, low, low + bundle.radius, azimuth) for azimuth in around)
+
+
+def _upwards(inner: float, aside: float, low: float, high: float, azimuth: float) -> tuple[Array, Array]:
+    """Return a path along the axis between two heights, then outwards at an azimuth [rad]."""
+    return towards(np.array([[inner, aside, low], [inner, aside, high]]), azimuth)
+
+
+def stator_exit(scanner: Scanner, stack: DirectStack, cage: BearingCage | None) -> StatorExit:
+    """Return the exit at the index side, next to flange and case, and through the base of a cage."""
+    start = np.array([0.0, stator_leads_y(scanner, stack), stack.ring_bottom])
+    return StatorExit(start, 0.0 if cage is None else stack.ring_bottom - cage.low, stiff=cage is not None)
 
 
 def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
-    """Return the drive of a scanner with a through-bore ring or without a ring.
-
-    Raises:
-        BuildError: it cannot be laid out.
-    """
+    """Return the drive of a scanner with a through-bore ring or without a ring."""
     stack, ears = direct_stack(scanner, envelope)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
@@ -100,53 +127,30 @@ def _stations(
 ) -> Iterator[Station]:
     servo, ring, bearing = scanner.servo, scanner.slip_ring, stack.bearing
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
-    low, half_x = (x0, y0, stack.horn + z0), max(-x0, x1)
-    case = Cuboid(low, (x1, y1, stack.horn + z1))
+    low = (x0, y0, stack.horn + z0)
     yield Station(
-        name=names.SERVO,
-        body="base",
-        z_mm=(low[2], stack.horn),
-        radius_mm=max(half_x, -y0, y1),
+        names.SERVO,
+        "base",
+        (low[2], stack.horn),
+        max(-x0, x1, -y0, y1),
         product=servo,
-        box=Cuboid(low, (x1, y1, stack.horn)),  # with its horn
-        shape=case,
+        box=(low, (x1, y1, stack.horn)),  # with its horn
+        shape=(low, (x1, y1, stack.horn + z1)),
     )
     if frame is not None:
-        yield Station(name=names.SERVO_FRAME, body="base", z_mm=(frame.low, frame.high), radius_mm=frame.reach_x)
-    yield Station(name=stack.shaft, body="horn", z_mm=(stack.horn, stack.spigot_top), radius_mm=stack.flange_radius)
+        yield Station(names.SERVO_FRAME, "base", (frame.low, frame.high), frame.reach_x)
+    yield Station(stack.shaft, "horn", (stack.horn, stack.spigot_top), stack.flange_radius)
     if cage is not None and ring is None:
-        yield Station(name=names.CAGE_BASE, body="base", z_mm=(cage.low, cage.high), radius_mm=stack.cage_outer)
+        yield Station(names.CAGE_BASE, "base", (cage.low, cage.high), stack.cage_outer)
     if ring is not None:
-        rod = Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top)
-        around, z = stack.ring_radius + ADAPTER_ARMS, (stack.horn, stack.ring_top)
-        yield Station(name=names.SLIP_RING_ADAPTER, body="base", z_mm=z, radius_mm=around)
-        yield Station(
-            name=names.RING,
-            body="base",
-            z_mm=(rod.low, rod.high),
-            radius_mm=rod.radius,
-            product=ring,
-            box=rod.cuboid(),
-            turning=0.5,
-            shape=rod,
-        )
+        yield Station(names.SLIP_RING_ADAPTER, "base", (stack.horn, stack.ring_top), stack.ring_radius + ADAPTER_ARMS)
+        yield Station.half_turning(ring, Rod(stack.ring_radius, stack.ring_bottom, stack.ring_top))
     if cage is not None and bearing is not None:
-        rod = Rod(bearing.outer_mm / 2, stack.bearing_top - bearing.width_mm, stack.bearing_top)
-        z = (cage.foot, stack.cage_top)
-        yield Station(name=names.BEARING_CAGE, body="base", z_mm=z, radius_mm=stack.cage_outer)
-        yield Station(
-            name=names.BEARING,
-            body="base",
-            z_mm=(rod.low, rod.high),
-            radius_mm=rod.radius,
-            product=bearing,
-            box=rod.cuboid(),
-            turning=0.5,
-        )
-        z = (stack.hub_bottom, stack.shoulder)
-        yield Station(name=names.JOURNAL_SLEEVE, body="rotor", z_mm=z, radius_mm=bearing.bore_mm / 2)
-    z = (stack.shoulder, -stack.h)
-    yield Station(name=names.ALIGNMENT_LINKAGE, body="rotor", z_mm=z, radius_mm=stack.hub_radius)
+        yield Station(names.BEARING_CAGE, "base", (cage.foot, stack.cage_top), stack.cage_outer)
+        seat = Rod(bearing.outer_mm / 2, stack.bearing_top - bearing.width_mm, stack.bearing_top)
+        yield Station.half_turning(bearing, seat)
+        yield Station(names.JOURNAL_SLEEVE, "rotor", (stack.hub_bottom, stack.shoulder), bearing.bore_mm / 2)
+    yield Station(names.ALIGNMENT_LINKAGE, "rotor", (stack.shoulder, -stack.h), stack.hub_radius)
 
 
 def _bears(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
@@ -185,7 +189,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
             holes=frame.feet,
             fixing="nut",
             corners=np.array([(sign * x, y, height) for sign in (-1, 1) for y in frame.ends_y for height in z]),
-            bodies=(*bodies, *map(box_corners, frame.boxes())),
+            bodies=(*bodies, box_corners(frame.sides()), frame.feet_corners(*frame.ends_y)),
             discs=discs,
             on_flat_deck=True,
             thread_mm=FOOT,

@@ -18,7 +18,6 @@ from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
     METAL_POISSON,
-    SHOCK_G,
     ShaftBend,
     Weight,
     tilt_sine,
@@ -27,7 +26,7 @@ from scanwright.cad.layout.loads import (
 )
 from scanwright.cad.layout.names import BEARING_CAGE, SERVO_HORN
 from scanwright.cad.layout.tightening import ALUMINIUM as TURNED
-from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, hold_of
+from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, SHOCK_G, hold_of
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.errors import BuildError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -115,14 +114,7 @@ def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_
 
 
 def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: ShaftMetal = ALUMINIUM) -> Supported:
-    """Share the weight between horn and bearing: the deflections of shaft and cage are equal at the bearing.
-
-    Args:
-        weight: of all that turns.
-        stack: with a bearing.
-        cage_n_per_m: sideways stiffness of the cage at the bearing.
-        metal: of the shaft.
-    """
+    """Share the weight of all that turns: the deflections of shaft and cage are equal at the bearing."""
     b = (stack.bearing_middle - stack.horn) / 1000
     waist = metal.waist * stack.waist_diameter
     above_horn, thick = stack.slices(1000 * b, waist)

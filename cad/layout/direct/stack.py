@@ -6,7 +6,7 @@ ring's top, all fixed parts around the shaft stay below it: clearance over a tur
 
     z = 0             optical centre
     -h                top of the linkage's hub
-    shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
+    shoulder          the height of the hub below: all that turns and is wider than the journal is above it
     hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
     leads_low         HUB_GAP, or the height of the bend of its leads, below: the end of the ring's rotor collar
     ring_top          the collar's length below
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.hub import HUB_GAP, HUB_HEIGHT, Hub
+from scanwright.cad.layout.hub import HUB_GAP, Hub
 from scanwright.cad.layout.names import HORN_CUP, SERVO_SHAFT
 from scanwright.design.arrays import Array
 
@@ -125,7 +125,7 @@ class DirectStack(Hub):
     def rims(self) -> list[tuple[float, float]]:
         """Radius and depth below the hub's top of the ring, or of seat and wall of the cage around it."""
         if self.bearing is None:
-            return [(self.ring_radius, HUB_HEIGHT + HUB_GAP)]
+            return [(self.ring_radius, self.cross_screw.hub_height + HUB_GAP)]
         seat = self.bearing.outer_mm / 2 + CAGE_SEAT_WALL
         return [(seat, -self.cage_top - self.h), (self.cage_outer, -self.cage_roof - self.h)]
 
@@ -187,11 +187,9 @@ class DirectStack(Hub):
         return np.where(np.asarray(above_horn) < self.horn_grip, 0.0, self.cup_bore / 2)
 
     def slices(self, length: float, waist_diameter: float) -> tuple[Array, Array]:
-        """Return middles and thicknesses of slices of the shaft above the horn; none crosses an edge of it.
+        """Return middles and thicknesses of slices of a length of shaft above the horn; none crosses an edge of it.
 
-        Args:
-            length: of the piece above the horn.
-            waist_diameter: of its waist, in the metal used.
+        Its waist has a diameter in the metal used.
         """
         waist = self.collar_height + self.waist_length
         slope = (self.shaft_diameter - waist_diameter) / 2

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from scanwright.cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
+from scanwright.cad.layout.envelope import Box, slot_ends
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.design.arrays import Array, Mask
 
@@ -37,7 +37,7 @@ def in_fan(points: Array, p: AlignmentLinkage, gap: float, fan_z: tuple[float, f
 
 def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
     """Return points on the paths of drivers of the lidar's screws; none with a sub-plate."""
-    below = points[:, 2] < p.top - PLATE_THICKNESS
+    below = points[:, 2] < p.top - p.plate
     if p.ears is not None:
         return np.zeros_like(below)
     return below & at_screws(points, p)
@@ -58,5 +58,7 @@ def _from_slot(points: Array, first: tuple[float, float], last: tuple[float, flo
 
 def in_hull(points: Array, corners: Array, gap: float) -> Mask:
     """Return points inside the convex hull of corners, shape (m, 3), or nearer to it than a gap."""
-    planes = ConvexHull(corners).equations
-    return np.asarray((planes[:, :3] @ points.T + planes[:, 3:]).max(axis=0) < gap)
+    inside = np.arange(len(points))
+    for *normal, offset in ConvexHull(corners).equations:  # most points fall out at the first few planes
+        inside = inside[points[inside] @ normal + offset < gap]
+    return np.isin(np.arange(len(points)), inside, assume_unique=True)

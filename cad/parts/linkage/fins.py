@@ -24,13 +24,7 @@ def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> l
     """Return cuts of what the hull would leave thinner than THIN next to the lidar, and than PRONG outside its cables.
 
     On each side: all beyond it, less the prism over the thick part of the hull. No face coincides with one of the hull
-    or of the lidar's space: the prism is 0.3 mm narrower, and the cut begins below the space.
-
-    Args:
-        top: height of the plate.
-        body: space of the lidar.
-        cables: spaces of its cables.
-        corners: of the neck, shape (n, 3).
+    or of the lidar's space: the prism is 0.3 mm narrower, and the cut begins below the space. `corners` are the neck's.
     """
     planes = np.unique(np.round(ConvexHull(corners).equations, 7), axis=0)
     (x0, y0, _), (x1, y1, _) = body
@@ -55,14 +49,8 @@ def fins_of(top: float, body: Box, cables: tuple[Box, ...], corners: Array) -> l
 def _thick(planes: Array, outward: Array, edge: float, least: float, onto: Array) -> Array | None:
     """Return the outline, shape (n, 2), 0.3 mm narrower, in which a hull is `least` thick beyond an edge, or None.
 
-    That is the shadow of the intersection of the hull, the hull moved by `least`, and the half space beyond the edge.
-
-    Args:
-        planes: of the hull.
-        outward: unit vector away from the lidar.
-        edge: distance of the edge from the lidar's axis.
-        least: thickness.
-        onto: the two directions of the shadow, shape (3, 2).
+    That is the shadow, onto two directions (3, 2), of the intersection of the hull, the hull moved by `least`, and the
+    half space beyond the edge.
     """
     moved = planes + np.outer(least * planes[:, :3] @ outward, [0.0, 0.0, 0.0, 1.0])
     sides = np.vstack([planes, moved, [*-outward, edge]])

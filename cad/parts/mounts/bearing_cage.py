@@ -24,8 +24,6 @@ from scanwright.cad.layout.direct.cage import (
     FOOT_RADIUS,
     SCREW_DEPTH,
     SEAT_GAP,
-    TRAP_WALL,
-    UNDER_CAGE_HEAD,
     UNDER_HEAD,
     WINDOW_HALF_WIDTH,
     BearingCage,
@@ -33,24 +31,17 @@ from scanwright.cad.layout.direct.cage import (
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import around_axis, box_corners
-from scanwright.cad.layout.joints import (
-    ALL_SCREWS,
-    Joint,
-    fixing_in,
-    inward_axes,
-    round_wall_mm,
-    screws,
-    upright_axes,
-)
+from scanwright.cad.layout.joints import ALL_SCREWS, Joint, fixing_in, inward_axes, round_wall_mm, screws, upright_axes
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step
-from scanwright.cad.parts.tolerances import OnSheet, printed_seat
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step, printed_seat
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
 BELL_GAP = 0.7  # around the bell's foot
+UNDER_CAGE_HEAD = 3.5  # of a leg
+TRAP_WALL = 3.0  # of the boss outside a nut
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
@@ -81,7 +72,7 @@ def bell_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(bearing_cage, p),
         step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
-        sheet=OnSheet((printed_seat(p.bearing, p.fit),)),
+        fits=(printed_seat(p.bearing, p.fit),),
         joints=(joint,),
         avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
         rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),

@@ -19,22 +19,18 @@ from scanwright.cad.layout.belt.stack import (
     BOSS,
     CASE_GAP,
     DISC,
+    DISC_SCREW,
     FOOT,
     FOOT_HALF,
     FOOT_HOLE,
     FOOT_SCREW,
-    LIP,
     PLATE_GRIP,
     PLATE_SCREW,
+    SCREW_DEPTH,
     SHELF,
     TRAVEL,
-    BeltStack,
-)
-from scanwright.cad.layout.belt.tower import (
-    DISC_SCREW,
-    SCREW_DEPTH,
     UNDER_FOOT_NUT,
-    UNDER_HEAD,
+    BeltStack,
     disc_azimuths,
     tower_corners,
 )
@@ -42,8 +38,7 @@ from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.joints import Joint, inward_axes, placed_axes, round_wall_mm
 from scanwright.cad.layout.names import BEARING, BEARING_TOWER, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import PartSpec, Step
-from scanwright.cad.parts.tolerances import OnSheet, printed_seat
+from scanwright.cad.parts.part_spec import PartSpec, Step, printed_seat
 from scanwright.cad.screws import Thread, Trap, passing_hole, thread_in_part, trap_of
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -53,6 +48,8 @@ WINDOW = 10.0  # diameter
 FOOT_CHAMFER = 8.0
 GROOVE = 1.0  # half width of the index groove
 MARKED = 6.0  # half of the edge that it is in
+LIP = 1.5  # of the tower inside the bearings' outer rings
+UNDER_HEAD = 3.5  # of the wall
 
 
 def tower_spec(place: Placement) -> PartSpec | None:
@@ -79,7 +76,8 @@ def tower_spec(place: Placement) -> PartSpec | None:
         step=Step(
             "Bearings into the tower", words, "both inner rings turn freely, neither bearing protrudes", (BEARING,)
         ),
-        sheet=OnSheet((printed_seat(stack.carrier, fit),), _nuts_words(foot, printer)),
+        fits=(printed_seat(stack.carrier, fit),),
+        notes=_nuts_words(foot, printer),
         shaped_by=("servo.case_min_mm", "servo.case_max_mm", "slip_ring.length_mm", "slip_ring.flange"),
         shapes={"printer.fit_clearance_mm": "every bore and seat"},
         joints=(joint,),

@@ -10,8 +10,7 @@ from functools import partial
 import cadquery as cq
 
 from scanwright.cad import solids
-from scanwright.cad.layout.belt.stack import DISC, BeltStack
-from scanwright.cad.layout.belt.tower import DISC_SCREW, SCREW_DEPTH, disc_azimuths, flange_centres
+from scanwright.cad.layout.belt.stack import DISC, DISC_SCREW, SCREW_DEPTH, BeltStack, disc_azimuths, flange_centres
 from scanwright.cad.layout.joints import Joint, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import BEARING_TOWER, RING, RING_STATOR, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement

@@ -10,9 +10,7 @@ from functools import partial
 import cadquery as cq
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.belt.plate import UNDER_HEAD
-from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack
-from scanwright.cad.layout.belt.tower import shelf_corners
+from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack, shelf_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import Joint, fixing_in, front_joint, placed_axes, screws, upright_axes
@@ -20,11 +18,11 @@ from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PLATE, SERVO, SERVO
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.mounts.bearing_cage import head_recess
 from scanwright.cad.parts.part_spec import PartSpec, Step, to_centre
-from scanwright.cad.parts.tolerances import OnSheet
 from scanwright.cad.screws import passing_hole, thread_in_part
 from scanwright.cad.solids import building
 
 FOOT_RADIUS = 3.0
+UNDER_HEAD = 2.5  # of the plate
 
 
 def plate_spec(place: Placement) -> PartSpec | None:
@@ -42,7 +40,7 @@ def plate_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(drive_plate, stack, p, slot),
         step=Step("Servo on its plate", words, "the horn still turns freely in the hole of the plate", (SERVO,)),
-        sheet=OnSheet(axis=stack.horn_axis),
+        axis=stack.horn_axis,
         shaped_by=("servo.case_max_mm", "servo.holes", "servo.horn_diameter_mm"),
         shapes={"belt.teeth": "the place of the servo"},
         joints=(

@@ -16,7 +16,6 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.direct.adapter import ARM, ARM_GAP, ARM_HALF_WIDTH, PLATE, UNDER_ROOF
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
@@ -37,6 +36,11 @@ RING_STEP = Step(
     "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )
 OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
+ARM_GAP = 0.25  # between arm and stator, on the radius
+ARM = 5.0
+ARM_HALF_WIDTH = 10.0
+UNDER_ROOF = 12.0  # from the arms' ends to the ring's top, under a cage
+PLATE = 6.0
 
 
 def adapter_spec(place: Placement) -> PartSpec | None:

@@ -1,6 +1,6 @@
 """Tripod foot: a plate under the mount, with a nut 1/4-20 UNC for a tripod's screw.
 
-Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/modules/tripod_foot.py`. It is below the
+Frame: rotation frame at gamma = 0, mm; its numbers are those of `cad/layout/deck.py`. It is below the
 mount's foot and has its outline. The tripod's nut is in a pocket that the mount closes; those of the mount's screws in
 pockets from below.
 """
@@ -13,15 +13,18 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.deck import OVER_NUTS, Deck, TripodFoot
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
-from scanwright.cad.layout.modules.tripod_foot import FLOOR, HEEL, OVER_NUTS, PROTRUDES, TripodFoot
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.parts.part_spec import PartSpec, Step
 from scanwright.cad.screws import TRIPOD_SCREW
 from scanwright.cad.solids import building
 from scanwright.design.left_out import LeftOut
+
+FLOOR = 2.0  # under the tripod's nut: its screw protrudes little
+PROTRUDES = 4.5  # of the screws of tripods, the short ones: ISO 1222, from memory; longer ones fit
+HEEL = 19.0  # half the width of the narrowest plate of a tripod's head: assumed
 
 
 def tripod_foot_spec(place: Placement) -> PartSpec | LeftOut:
@@ -54,8 +57,8 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         TRIPOD_FOOT,
         fixing_in(p.mount),
         deck.screw,
-        placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), R, deck.centre),
-        grip_mm=FOOT_THICKNESS,
+        placed_axes(upright_axes(deck.deck_holes, deck.foot_mm, -1.0), R, deck.centre),
+        grip_mm=deck.foot_mm,
         thread_mm=p.thickness if p.mount.trap is None else OVER_NUTS,
         thread=p.mount,
     )

@@ -16,8 +16,7 @@ from scanwright.cad.layout.hub import BEARING_STEP, JOURNAL_WALL
 from scanwright.cad.layout.names import JOURNAL_SLEEVE
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
-from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Row, Step
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import TURNED_FROM, PartSpec, Row, Step, ToleratedDiameter
 from scanwright.cad.solids import building
 
 SLIDES = 0.02  # in the inner ring: the lower end of g6
@@ -48,7 +47,8 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         process="turned",
         material=TURNED_FROM,
         why_metal=f"{stack.bearing.name} needs a round seat to g6",
-        sheet=OnSheet((seat, bore), ("Bore and outside in one setting: runout 0.01.",)),
+        fits=(seat, bore),
+        notes=("Bore and outside in one setting: runout 0.01.",),
         shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
         rows=(
             Row("consumable", "retaining ring", f"retaining ring DIN 471 - {stack.retaining_ring}", RETAINING),

@@ -15,9 +15,8 @@ from scanwright.cad.layout.belt.stack import RING_SCREW, RING_SCREWS_DEG, BeltSt
 from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, MAIN_SHAFT
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step
+from scanwright.cad.parts.part_spec import SEATED, TURNED_FROM, PartSpec, Step, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.parts.shafts.servo_shaft import cross_holes, cross_words
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter, spigot_in_hub
 from scanwright.cad.solids import building
 
 UNDER_HUB = 0.3  # gap: the end of the spigot carries the hub, not the shoulder
@@ -47,13 +46,11 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
         process="turned",
         material=TURNED_FROM,
         why_metal=f"two bearings of {stack.carrier.bore_mm:g} mm need its seats to f7 (-0.02 to -0.041)",
-        sheet=OnSheet(
-            (seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
-            (
-                *cross_words(stack),
-                f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
-                "pass.",
-            ),
+        fits=(seat, spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm)),
+        notes=(
+            *cross_words(stack),
+            f"2 x {RING_SCREW.name} into the bore near the lower end, square to each other: deburred inside, leads "
+            "pass.",
         ),
         shaped_by=("bearing.bore_mm", "slip_ring.rotor"),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft, and the belt set", LINKAGE_WORDS, SEATED)},

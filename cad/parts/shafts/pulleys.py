@@ -18,8 +18,7 @@ import numpy as np
 from scanwright.cad import solids
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.loads import PRELOAD_N, press_newton
-from scanwright.cad.layout.belt.plate import pulley_foot_radius
-from scanwright.cad.layout.belt.stack import BOSS, GRUB, GRUBS_DEG, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack
+from scanwright.cad.layout.belt.stack import BOSS, HORN_BOSS_GAP, RIM, TRAVEL, BeltStack, pulley_foot_radius
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.joints import (
     Joint,
@@ -31,8 +30,7 @@ from scanwright.cad.layout.joints import (
     screws,
 )
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step
-from scanwright.cad.parts.tolerances import OnSheet, no_wider
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, no_wider
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -41,6 +39,8 @@ CHORDS = 4  # of a groove's half circle: within 0.05 mm, below the resolution of
 MOUTH = 0.25  # extra width of a groove at the tips, on each side
 GIVE_MM = 2.0  # movement of a strand in the test of its pre-load
 OFF_AXIS = "more clearance puts the pulley further off its axis than belt_angle of checks.json assumes"
+GRUB = SCREWS["M3"]  # of the pulley on the shaft
+GRUBS_DEG = (45.0, 135.0)  # their azimuths from +x: on both sides of the flat
 
 
 def shaft_pulley_spec(place: Placement) -> PartSpec | None:
@@ -60,7 +60,8 @@ def shaft_pulley_spec(place: Placement) -> PartSpec | None:
         turns=True,
         make=partial(shaft_pulley, stack, printer),
         step=Step("Pulley and belt on the shaft", words, "the belt is between both rims", (names.BELT,)),
-        sheet=OnSheet((fit,), (_teeth_words(stack),)),
+        fits=(fit,),
+        notes=(_teeth_words(stack),),
         shapes={"belt.thickness_mm": "the rims of the pulleys", "belt.groove_radius_mm": "the teeth of the pulleys"},
         joints=(
             Joint(
@@ -110,7 +111,9 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer, foot),
         step=Step("Drive pulley and servo", words, "the belt runs a turn in its rims"),
-        sheet=OnSheet(fits, (_teeth_words(stack),), stack.horn_axis),
+        fits=fits,
+        notes=(_teeth_words(stack),),
+        axis=stack.horn_axis,
         shaped_by=(*HORN, "servo.horn_thickness_mm"),
         sweep=partial(drive_envelope, stack, foot),
         joints=(replace(horn, axes=placed_axes(horn.axes, stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0])),),

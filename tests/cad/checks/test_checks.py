@@ -11,14 +11,14 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanwright.cad.assembly import masses
 from scanwright.cad.checks import run
 from scanwright.cad.checks.checks_json import checks_text, failure_lines, read_checks
 from scanwright.cad.checks.clearance import together_check, turning_check
-from scanwright.cad.checks.limits import at_least, at_most
-from scanwright.cad.checks.loads.mechanics import mechanics_checks
-from scanwright.cad.checks.printing import islands_check, islands_of, printing_checks, thin_walls
-from scanwright.cad.checks.wiring import wiring_checks
+from scanwright.cad.checks.loads import mechanics
+from scanwright.cad.checks.loads.mechanics import load_checks
+from scanwright.cad.checks.printing import islands_check, islands_of, part_checks, thin_walls
+from scanwright.cad.checks.products import wiring_checks
+from scanwright.cad.checks.table import at_least, at_most
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.geometry.print_pose import print_pose
@@ -131,7 +131,7 @@ def test_a_thin_wall_is_measured_and_a_wedge_is_none():
 
 def printed(printer, part):
     mesh = mesh_of(part)
-    return printing_checks(printer, {"part": part}, {"part": mesh}, {"part": print_pose(mesh, printer.bed_mm)})
+    return list(part_checks("part", part, mesh, print_pose(mesh, printer.bed_mm), printer))
 
 
 def test_the_thinnest_spot_and_the_hole_beside_it_are_told():
@@ -184,7 +184,7 @@ def test_loads_against_hand_calculation():
     alone = replace(scanner, bearings=(), slip_ring=None)
     stack = drive_of(alone).stack
     lever = -stack.horn / 1000 - 0.030
-    found = {c.code: c for c in mechanics_checks(placement_of(alone), bodies(2.0, -0.030))}
+    found = {c.code: c for c in load_checks(placement_of(alone), bodies(2.0, -0.030))}
     weight = 2.0 * 9.80665
     assert found["tilt_moment"].value == pytest.approx(weight * lever, rel=1e-3)
     assert found["tilt_moment"].severity == "error"
@@ -196,33 +196,33 @@ def test_loads_against_hand_calculation():
     )
     assert found["axial_load"].value == pytest.approx(0, abs=1e-6)
     weight = 0.5 * 9.80665
-    held = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.5, -0.030))}
+    held = {c.code: c for c in load_checks(placement_of(scanner), bodies(0.5, -0.030))}
     assert held["tilt_moment"].severity == "ok" and held["bearing_load"].value > weight
     assert held["static_torque"].value == pytest.approx(weight * 0.012 + rubs, rel=1e-3)
     upright = scanner_for(0, 0, 30, -30)
-    heavy = {c.code: c.severity for c in mechanics_checks(placement_of(upright), bodies(3.0, -0.030))}
+    heavy = {c.code: c.severity for c in load_checks(placement_of(upright), bodies(3.0, -0.030))}
     assert heavy["axial_load"] == "error"
 
 
 def test_a_counterweight_is_worked_out_where_gravity_swings_the_gears():
     scanner = scanner_for(0, 90, 30, -30)
-    found = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.5, -0.030))}["flanks"]
+    found = {c.code: c for c in load_checks(placement_of(scanner), bodies(0.5, -0.030))}["flanks"]
     assert (found.severity, found.value) == ("warning", pytest.approx(0.5 * 9.80665 * 0.012, rel=1e-3))
     grams, at, azimuth = (
         float(n) for n in re.search(r"(\d+) g at (\d+) mm from the axis, (\d+) deg", found.hint).groups()
     )
     assert grams * at == pytest.approx(500 * 12, rel=0.01) and azimuth == 180  # the imbalance is at +x
     upright = scanner_for(0, 0, 30, -30)
-    found = {c.code: c for c in mechanics_checks(placement_of(upright), bodies(0.5, -0.030))}["flanks"]
+    found = {c.code: c for c in load_checks(placement_of(upright), bodies(0.5, -0.030))}["flanks"]
     assert found.severity == "ok"
     exact = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": 0.01}))
-    found = {c.code: c for c in mechanics_checks(placement_of(exact), bodies(0.5, -0.03))}["flanks"]
+    found = {c.code: c for c in load_checks(placement_of(exact), bodies(0.5, -0.03))}["flanks"]
     assert found.severity == "note"
 
 
 def test_the_friction_of_a_ring_counts_in_every_torque_and_its_least_holds_a_flank():
     free, rubbing = scanner_for(0, 90, 30, -30), scanner_for(0, 90, 30, -30, friction_nm=(0.16, 0.2))
-    loads = [{c.code: c for c in mechanics_checks(placement_of(each), bodies(0.5, -0.030))} for each in (free, rubbing)]
+    loads = [{c.code: c for c in load_checks(placement_of(each), bodies(0.5, -0.030))} for each in (free, rubbing)]
     for kind in ("static_torque", "spin_up_torque"):
         assert loads[1][kind].value - loads[0][kind].value == pytest.approx(0.2 - 0.005, rel=1e-3)
     assert (loads[1]["flanks"].severity, loads[1]["flanks"].limit) == ("ok", 0.16)
@@ -242,7 +242,7 @@ def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypa
 
     def found(x_m):
         given = {"rot": Inertial(0.1, np.array([x_m, 0.0, -0.03]), inertia), "laser": lidar}
-        return {c.code: c for c in mechanics_checks(placement_of(scanner), given)}
+        return {c.code: c for c in load_checks(placement_of(scanner), given)}
 
     # 0.4 kg that may be 2 mm off, across a level axis; of 0.5 kg that turn it is 1.6 mm
     static = found(0.001)["static_torque"]
@@ -252,7 +252,7 @@ def test_what_nobody_tells_of_a_lidars_weight_is_told_with_every_torque(monkeypa
     assert (flanks.severity, flanks.limit) == ("warning", 0.005)
     assert "the centre of mass of UTM-30LX is undocumented" in flanks.message
     assert "back and forth" in found(0.006)["flanks"].message
-    monkeypatch.setattr(masses, "LIDAR_CENTRE_ERROR_MM", 0.5)
+    monkeypatch.setattr(mechanics, "LIDAR_CENTRE_ERROR_MM", 0.5)
     assert found(0.001)["flanks"].severity == "ok"
 
 
@@ -285,7 +285,7 @@ def test_large_numbers_are_written_in_full():
 
 def test_a_servo_without_a_rating_is_noted_not_passed():
     scanner = scanner_for(0, 60, 30, -30, "URG-04LX", "AX-12A")
-    found = {c.code: c for c in mechanics_checks(placement_of(scanner), bodies(0.3, -0.03))}
+    found = {c.code: c for c in load_checks(placement_of(scanner), bodies(0.3, -0.03))}
     for kind in ("tilt_moment", "axial_load"):
         assert (found[kind].severity, found[kind].limit) == ("note", None)
         assert "unrated by its maker" in found[kind].message

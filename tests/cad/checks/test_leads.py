@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scanners import scanner_at
 
+from scanwright.cad.assembly.bought import lead_solid
+from scanwright.cad.assembly.scenes import steps_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
-from scanwright.cad.assembly.steps import steps_of
-from scanwright.cad.assembly.tube import lead_solid
 from scanwright.cad.checks.cables import rotor_cable_checks
 from scanwright.cad.checks.clearance import clearance_checks
-from scanwright.cad.layout.cables import joint
-from scanwright.cad.layout.cables.path import Path
+from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL
+from scanwright.cad.layout.cables.route import Path
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +28,9 @@ def test_leads_touch_nothing_and_bend_no_further_than_they_may(lying):
 
 def test_a_tube_has_the_volume_of_its_wires_and_its_joint(lying):
     for number, lead in enumerate(lying.layout.leads, start=1):
-        half, wide = lead.diameter / 2, lead.diameter / 2 + joint.WALL
+        half, wide = lead.diameter / 2, lead.diameter / 2 + TUBE_WALL
         wanted = np.pi * (
-            half**2 * (lead.path.length() - joint.LENGTH) + wide**2 * joint.LENGTH
+            half**2 * (lead.path.length() - JOINT_LENGTH) + wide**2 * JOINT_LENGTH
         )  # Pappus: the middle is the centroid
         assert lying.bought[f"rotor_lead_{number}"].Volume() == pytest.approx(wanted, rel=1e-4)
 

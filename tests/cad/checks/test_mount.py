@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scanwright.cad.assembly.masses import link_bodies
-from scanwright.cad.checks.loads.mount import carried, mount_checks
+from scanwright.cad.assembly.assembly import link_bodies
+from scanwright.cad.checks.loads.deflection import carried, mount_checks
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.names import BASE_MOUNT
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
-from scanwright.cad.statics.mount_sag import Carried, mount_sag
+from scanwright.cad.statics.sag import Carried, mount_sag
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 
 HALF, HIGH, MODULUS, DENSITY = 12.0, 120.0, 2000.0, 1.2  # mm, MPa, g/cm3
@@ -41,9 +41,9 @@ def test_a_post_bends_as_a_beam_does(arm_m, seat_mm):
 
 
 def test_a_mount_leans_where_its_load_pulls_it(made):
-    scanner, assembly = made.scanner, made.result.assembly
-    bodies = link_bodies(scanner, assembly)
-    load, deck = carried(scanner, assembly, bodies), assembly.layout.deck
+    assembly = made.result.assembly
+    bodies = link_bodies(assembly)
+    load, deck = carried(assembly, bodies), assembly.layout.deck
     turned = sum(
         mount_sag(assembly.mesh(BASE_MOUNT), deck, assembly.layout.drive.mounted, load, MODULUS, DENSITY)[:2],
         np.zeros(3),
@@ -57,6 +57,6 @@ def test_a_build_tells_the_lean_and_the_pose_that_it_belongs_to(made):
     assert check["severity"] == "note" and 0.01 < check["value"] < 1.0 and "pose on the robot" in check["message"]
 
 
-def test_a_scanner_without_a_mount_has_no_lean(made):
+def test_a_scanner_without_a_mount_has_no_lean():
     bare = SimpleNamespace(made={})
-    assert mount_checks(made.scanner, bare, {}, {}) == ([], None)
+    assert mount_checks(bare, {}) == ([], None)

@@ -56,12 +56,12 @@ def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
 
 
 def test_a_bearing_takes_load_off_the_horn_and_gives_it_to_its_cage(scanner_and_assembly, monkeypatch):
-    scanner, assembly = scanner_and_assembly
+    _, assembly = scanner_and_assembly
     if assembly.layout.drive.of(BearingCage) is None:
         return
 
     def margins():
-        return {c.subject: c.value for c in retention_checks(scanner, assembly) if c.code == "retention"}
+        return {c.subject: c.value for c in retention_checks(assembly) if c.code == "retention"}
 
     shared = margins()
     monkeypatch.setattr(room, "_borne", lambda *_: (np.zeros(3), 0.0))
@@ -72,8 +72,8 @@ def test_a_bearing_takes_load_off_the_horn_and_gives_it_to_its_cage(scanner_and_
 
 
 def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_assembly):
-    scanner, assembly = scanner_and_assembly
-    checks = retention_checks(scanner, assembly)
+    _, assembly = scanner_and_assembly
+    checks = retention_checks(assembly)
     assert {check.severity for check in checks if "shaft_pulley" not in check.subject} == {"ok"}
     (friction,) = [check for check in checks if "friction: they" in check.message] or [None]
     assert (friction is None) == (assembly.layout.drive.shaft == "servo_shaft")  # the pulley, which is set by turning
@@ -84,27 +84,27 @@ def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_asse
 
 
 def test_what_gives_way_fails_and_what_has_little_to_spare_warns(scanner_and_assembly, monkeypatch):
-    scanner, assembly = scanner_and_assembly
-    margin = min(c.value for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None)
+    _, assembly = scanner_and_assembly
+    margin = min(c.value for c in retention_checks(assembly) if c.code == "retention" and c.value is not None)
     for over, severity in ((0.4 * margin, "ok"), (0.7 * margin, "warning"), (1.3 * margin, "error")):
         with monkeypatch.context() as shaken:
             shaken.setattr(room, "SHOCK_G", 5.0 * over)
-            checks = [c for c in retention_checks(scanner, assembly) if c.code == "retention" and c.value is not None]
+            checks = [c for c in retention_checks(assembly) if c.code == "retention" and c.value is not None]
         weakest = min(checks, key=lambda check: check.value)
         assert (weakest.severity, weakest.value) == (severity, pytest.approx(margin / over, rel=0.02))
 
 
 def test_friction_or_bare_plastic_does_not_carry_a_lidar(scanner_and_assembly):
-    scanner, assembly = scanner_and_assembly
+    _, assembly = scanner_and_assembly
     joints = assembly.layout.joints
     hub = joint_of(assembly, "alignment_linkage", assembly.layout.drive.shaft)
     loose = _instead(assembly, hub, replace(hub, fixing="grub"))
-    assert [check.subject for check in retention_checks(scanner, loose) if check.severity == "error"] == [
+    assert [check.subject for check in retention_checks(loose) if check.severity == "error"] == [
         f"{hub.part} and {hub.onto}"
     ]
     for nuts in (joint for joint in joints if joint.onto == "bearing_tower" and joint.part == "base_mount"):
         bare = _instead(assembly, nuts, replace(nuts, fixing="thread", thread=None))
-        failed = [check.message for check in retention_checks(scanner, bare) if check.severity == "error"]
+        failed = [check.message for check in retention_checks(bare) if check.severity == "error"]
         assert any("threads in bare plastic" in message for message in failed)
 
 

@@ -7,17 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scanwright.cad.assembly.masses import link_bodies
-from scanwright.cad.checks.loads.vibration import amplitude_m, vibration_checks
+from scanwright.cad.assembly.assembly import link_bodies
+from scanwright.cad.checks.loads.deflection import amplitude_m, vibration_check
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.direct.loads import shaft_bend
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
-from scanwright.cad.statics.mount_sag import Carried, mount_sag
-from scanwright.cad.statics.spring import Spring, of_shaft
-from scanwright.cad.statics.vibration import mass_matrix, row_of
+from scanwright.cad.statics.sag import Carried, mount_sag
+from scanwright.cad.statics.spring import Spring, mass_matrix, of_shaft, row_of
 
 E_PA, DIAMETER, LENGTH = 70e9, 0.012, 0.1
 SECOND = math.pi / 64 * DIAMETER**4
@@ -94,7 +93,8 @@ def test_a_horn_that_tilts_and_seats_that_give_way_add_to_the_shaft(made):
 def _checked(made, linkage, **lidar):
     scanner = replace(made.scanner, lidar=made.scanner.lidar.model_copy(update=lidar))
     assembly = made.result.assembly
-    return vibration_checks(scanner, assembly, link_bodies(scanner, assembly), linkage, None)[0]
+    assembly = replace(assembly, layout=replace(assembly.layout, scanner=scanner))
+    return vibration_check(assembly, link_bodies(assembly), linkage, None)
 
 
 def test_a_frequency_near_that_of_the_mirror_is_a_warning_that_states_an_amplitude(made):

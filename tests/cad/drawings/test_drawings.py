@@ -22,15 +22,14 @@ from svglib.svglib import svg2rlg
 
 from scanwright.cad.drawings import project as projection
 from scanwright.cad.drawings.dimensions import angle_between, spread
-from scanwright.cad.drawings.part import part_of
-from scanwright.cad.drawings.patterns import number, patterns_of
+from scanwright.cad.drawings.patterns import number, part_of, patterns_of
 from scanwright.cad.drawings.pen import CAPITAL, DIAMETER, TURN_RAD, Pen, document_at
 from scanwright.cad.drawings.project import Arc, project
-from scanwright.cad.drawings.section import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.sheet import A2, A3, Sheet, Title, sheet_of
+from scanwright.cad.drawings.views import HATCH_MM, cut_along_axis, hatching
 from scanwright.cad.drawings.write import Outline, Words, drawn_on, dxf_bytes, pdf_bytes, svg_bytes
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.parts.tolerances import OnSheet, ToleratedDiameter
+from scanwright.cad.parts.part_spec import PartSpec, ToleratedDiameter
 from scanwright.cad.solids import box, cylinder, upright
 from scanwright.design.errors import BuildError
 
@@ -429,7 +428,7 @@ def struck(sheet):
 
 
 def sheet_with(solid, *, lidar_axis=None, fits=()):
-    part = part_of("part", solid.Solids()[0], lidar_axis, OnSheet(fits), [])
+    part = part_of(PartSpec(name="part", turns=False, make=solid.copy, fits=fits), solid.Solids()[0], lidar_axis, [])
     return sheet_of(part, Title((("part", "part"),), ("A note.",)), "part")
 
 

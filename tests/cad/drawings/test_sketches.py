@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from scanwright.cad.drawings.devices.sketch import sketch_svg
 from scanwright.cad.drawings.pen import CAPITAL, GLYPH_WIDTH
+from scanwright.cad.drawings.sketch import sketch_svg
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.products import Belt, Multibeam, Printer
 from scanwright.design.errors import TaskError

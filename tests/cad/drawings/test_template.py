@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
 
-from scanwright.cad.drawings.devices.template import template_pdf
+from scanwright.cad.drawings.files import template_pdf
 from scanwright.cad.drawings.write import POINTS_PER_MM
 from scanwright.cad.geometry.mesh import mesh_of
-from scanwright.cad.labels.test_plate import EDGE_MM, make_test_plate
+from scanwright.cad.labels.fit_coupon import EDGE_MM, make_test_plate
+from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.names import LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT
-from scanwright.cad.layout.screw_patterns import screw_patterns
-from scanwright.cad.measure.bores import bores_of
-from scanwright.cad.measure.walls import walls_of
+from scanwright.cad.measure.bores import bores_of, walls_of
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import passing_hole
 

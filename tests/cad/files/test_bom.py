@@ -230,13 +230,13 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assembly = make_parts(scanner)
     joints = assembly.layout.joints
     masses = dict.fromkeys(assembly.made, 1.0)
-    items = items_of(scanner, assembly, joints, masses, "0123456789ab")
+    items = items_of(assembly, masses)
     assert "slip ring" not in {item.part for item in items}
     lidar = next(item for item in items if item.part == "lidar")
     assert lidar.unit_usd is None and "price unknown" in lidar.note
     assert items[-1].total_usd == scanner.servo.price_usd
     assert bom_text(items).count("\n") == len(items) + 1
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
+    text = instructions_text(assembly, scenes_of(assembly), [])
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
     assert (seat.part, seat.count) == ("sub_plate", 4)
@@ -247,7 +247,7 @@ def test_what_is_not_verified_is_measured_before_anything_is_printed(made):
     lidar._provenance = lidar.provenance() | {"holes": Provenance(source="assumed", verified=False)}
     layout = replace(assembly.layout, scanner=replace(made.scanner, lidar=lidar))
     changed = replace(assembly, layout=layout)
-    text = instructions_text(layout.scanner, changed, scenes_of(changed, layout.joints), [], "0123456789ab")
+    text = instructions_text(changed, scenes_of(changed), [])
     first = re.search(rf"Measure first, no source verifies [^:]*holes[^:]* of {lidar.name}: press paper", text)
     assert first and first.end() < text.index("Try the hole patterns before you print")
     assert "Measure first" not in text[text.index("## 1.") :]
@@ -285,8 +285,6 @@ def test_a_profile_with_inserts_gets_their_seats_and_lists_them(parts_of):
     assert len(seats) == 4 and min(hole.length for hole in seats) > INSERT_LENGTH
     by_threads = {(joint.part, joint.onto) for joint in laid_out(scanner_at(TILTED)).joints}
     assert {(joint.part, joint.onto) for joint in joints} == by_threads
-    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
+    items = items_of(assembly, dict.fromkeys(assembly.made, 1.0))
     assert [(item.number, item.quantity) for item in items if item.kind == "insert"] == [("M3", 4)]
-    assert "Melt the inserts in" in instructions_text(
-        scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab"
-    )
+    assert "Melt the inserts in" in instructions_text(assembly, scenes_of(assembly), [])

@@ -19,7 +19,7 @@ from scanwright.cad.geometry.print_pose import on_bed
 @pytest.fixture(scope="module")
 def scenes(made):
     assembly = made.result.assembly
-    return scenes_of(assembly, assembly.layout.joints)
+    return scenes_of(assembly)
 
 
 def pixels(png):
@@ -70,7 +70,7 @@ def test_what_comes_is_coloured_and_stands_where_it_comes_from(scenes, made):
 def test_every_step_has_its_picture_in_the_folder_and_the_same_bytes_again(scenes, made):
     assembly = made.result.assembly
     text = (made.folder / "assembly.md").read_text(encoding="utf-8")
-    again = step_files(made.scanner, assembly, made.result.meshes, assembly.layout.joints, [], "0" * 12)
+    again = step_files(assembly, made.result.meshes, [])
     for number, scene in enumerate(scenes, start=1):
         name = picture_name(number)
         assert f"]({name})" in text and scene.step.check in text

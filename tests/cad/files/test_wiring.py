@@ -7,8 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from scanwright.cad.files.schematic import schematic_svg
-from scanwright.cad.files.wiring import wiring_files
+from scanwright.cad.files.wiring import schematic_svg, wiring_files
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.lidar import Lidar

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 from scanners import avoided
 
-from scanwright.cad.layout.cables.joint import LENGTH, STEP, WALL, joint_of
-from scanwright.cad.layout.cables.leads import leads_of, outlet_mm
-from scanwright.cad.layout.cables.path import Path
-from scanwright.cad.layout.cables.rotor_space import rotor_space_of
-from scanwright.cad.layout.cables.route import Ending, short_path
+from scanwright.cad.layout.cables.leads import (
+    JOINT_LENGTH,
+    JOINT_STEP,
+    TUBE_WALL,
+    joint_of,
+    leads_of,
+    outlet_mm,
+    rotor_space_of,
+)
+from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.direct.stack import CAGE_SEAT_WALL
 from scanwright.cad.layout.placement import placement_of
@@ -185,8 +190,8 @@ def test_joints_touch_neither_the_hub_nor_the_other_lead(setting):
     leads = [lead for lead in layout.leads if lead.joint is not None]
     assert leads
     for lead in leads:
-        thick, points = lead.diameter / 2 + WALL, lead.joint.points()
-        assert np.ptp(points, axis=0) @ np.ptp(points, axis=0) == pytest.approx(LENGTH**2)
+        thick, points = lead.diameter / 2 + TUBE_WALL, lead.joint.points()
+        assert np.ptp(points, axis=0) @ np.ptp(points, axis=0) == pytest.approx(JOINT_LENGTH**2)
         if setting != "belt":  # whose leads leave through the shaft
             assert (np.hypot(points[:, 0], points[:, 1]) > layout.stack.hub_radius + thick).all()
         for other in leads:
@@ -212,8 +217,8 @@ def test_a_joint_goes_as_far_from_the_middle_as_it_must_and_stays_there_where_no
         joint = joint_of(path, half, Wall(wall), [])
         points = joint.points()
         away = joint.middle[1] - middle[1]
-        assert off == 0.0 or points[:, 1].min() > wall + half + WALL
-        assert off - 0.1 <= away < off + STEP + 0.1
+        assert off == 0.0 or points[:, 1].min() > wall + half + TUBE_WALL
+        assert off - 0.1 <= away < off + JOINT_STEP + 0.1
         np.testing.assert_allclose(joint.middle[[0, 2]], middle[[0, 2]], atol=1e-12)
     beside = np.array([[0.0, y, 20.0] for y in np.arange(20.0, 35.0)])
     clear = joint_of(path, half, Wall(-10.0), [(beside, 3.0)]).points()[:, 1]

@@ -10,7 +10,7 @@ import pytest
 from quick_tests import samples
 
 from benchmarks.cad.combinations import screws_without_a_hole
-from scanwright.cad.assembly.bought_shapes import servo_case, servo_horn
+from scanwright.cad.assembly.bought import servo_case, servo_horn
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
 from scanwright.cad.checks.loads.retention import retention_checks, worst_shares
@@ -209,7 +209,7 @@ def test_without_a_ring_every_horn_gets_a_printed_cup_around_the_heads_of_its_sc
     assert stack.cup_bore >= scanner.servo.horn_circle_mm + screw.head_diameter  # the heads pass it
     assembly = make_parts(scanner)
     assert {part.process for part in assembly.parts.values()} == {"printed"} and "horn_cup" in assembly.parts
-    checks = [*retention_checks(scanner, assembly), *clearance_checks(assembly)]
+    checks = [*retention_checks(assembly), *clearance_checks(assembly)]
     assert {check.severity for check in checks} == {"ok"}
 
 
@@ -238,7 +238,7 @@ def test_a_cup_holds_the_hub_by_what_the_printer_gives_threads(printer):
         assert solid(axis, 4.0, 0.6 * joint.thread.hole) == (not joint.traps)
         tip_mm = float(np.linalg.norm(axis.start[:2])) - joint.length_mm
         assert tip_mm > stack.cup_bore / 2 - 1.0  # above the heads of the horn's screws nothing is in the way
-    assert {check.severity for check in retention_checks(scanner, assembly)} == {"ok"}
+    assert {check.severity for check in retention_checks(assembly)} == {"ok"}
 
 
 def test_a_ring_still_asks_for_a_turned_shaft():

@@ -8,12 +8,9 @@ import pytest
 
 from scanwright.cad import solids
 from scanwright.cad.geometry.mesh import mesh_of, stl_bytes
-from scanwright.cad.measure.bores import bores_of, likely_screws
-from scanwright.cad.measure.files import measure_files
-from scanwright.cad.measure.model import read_model, turned
-from scanwright.cad.measure.proposal import propose, toml_text
-from scanwright.cad.measure.walls import walls_of
-from scanwright.cad.measure.window import window_of
+from scanwright.cad.measure.bores import bores_of, likely_screws, walls_of
+from scanwright.cad.measure.files import measure_files, read_model, turned
+from scanwright.cad.measure.proposal import propose, toml_text, window_of
 from scanwright.design.catalogue.catalogue import SHIPPED, load_catalogue, load_product
 from scanwright.design.errors import SceneError, TaskError
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, bare_linkage, scanner_at
 
+from scanwright.cad.assembly.assembly import link_bodies, rotor_moment, rotor_of
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.assembly.masses import link_bodies, rotor_moment, rotor_of
 from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.files.manual.instructions import instructions_text
@@ -57,7 +57,7 @@ def test_the_rotor_is_balanced_by_its_meshes(made):
     plastic = scanner.printer.density_g_cm3 / 1000
     density = {"counterweight": STEEL, "servo_shaft": ALUMINIUM}
     moment = np.zeros(2)
-    for name, mesh in meshes(assembly, assembly.turning_parts()).items():
+    for name, mesh in meshes(assembly, assembly.parts_in("rot")).items():
         moment += density.get(name, plastic) * mesh.volume * mesh.center_mass[:2]
     lidar = scanner.lidar
     to_middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
@@ -86,10 +86,10 @@ def test_leads_weigh_what_their_wires_do(made):
     mass = WIRES * sum(mesh.volume for mesh in wires)
     moment = WIRES * sum(mesh.volume * mesh.center_mass[:2] for mesh in wires)
     bare = replace(assembly, layout=replace(assembly.layout, leads=()))
-    with_leads, without = (rotor_of(scanner, link_bodies(scanner, each)) for each in (assembly, bare))
+    with_leads, without = (rotor_of(scanner, link_bodies(each)) for each in (assembly, bare))
     # the shrink tube over a joint is no wire
     assert 1000 * (with_leads.mass_kg - without.mass_kg) == pytest.approx(mass, rel=0.06) and mass > 1
-    np.testing.assert_allclose(rotor_moment(scanner, assembly) - rotor_moment(scanner, bare), moment, atol=8)
+    np.testing.assert_allclose(rotor_moment(assembly) - rotor_moment(bare), moment, atol=8)
     lead, solid = assembly.layout.leads[laid[0] - 1], assembly.bought[f"rotor_lead_{laid[0]}"]
     line, tube = of_line(lead.mass_g, lead.path.points(SAMPLE)), of_solid(solid, 1000 * WIRES)
     np.testing.assert_allclose(line.inertia_kg_m2, tube.inertia_kg_m2, atol=0.06 * np.abs(tube.inertia_kg_m2).max())
@@ -129,13 +129,13 @@ def test_the_bar_touches_nothing_but_its_ear_and_no_beam_wherever_it_slides(made
 
 
 def test_screws_from_below_and_a_step_that_says_so(made):
-    scanner, assembly = made
+    _, assembly = made
     joints = assembly.layout.joints
     (joint,) = [joint for joint in joints if joint.onto == "counterweight"]
     assert (joint.part, joint.count, joint.fixing, joint.screw.name) == ("alignment_linkage", 2, "thread", "M4")
     bar = assembly.layout.counterweight
     assert bar.ear.high - bar.ear.low + 6 <= joint.length_mm <= bar.ear.high - bar.ear.low + bar.section[1]
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0" * 12)
+    text = instructions_text(assembly, scenes_of(assembly), [])
     assert text.index("Lidar on its seat") < text.index("Counterweight on the linkage") < text.index("Linkage on the")
 
 

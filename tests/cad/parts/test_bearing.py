@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from quick_tests import samples
 from scanners import GROUND_AHEAD, ROLLING, digest_of, scanner_at
 
-from scanwright.cad.assembly.masses import link_bodies, rotor_weight
-from scanwright.cad.checks.loads.mechanics import mechanics_checks
+from scanwright.cad.assembly.assembly import link_bodies, rotor_weight
+from scanwright.cad.checks.loads.mechanics import load_checks
 from scanwright.cad.checks.loads.retention import worst_shares
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m
@@ -76,11 +76,11 @@ def body(meshes, turn=0.0):
 
 def test_the_horn_stays_within_its_rating(made):
     name, scanner, assembly, _ = made
-    bodies = link_bodies(scanner, assembly)
+    bodies = link_bodies(assembly)
     weight = rotor_weight(scanner, assembly.layout.stack, bodies)
     limit = scanner.servo.radial_load_n * 0.010
     assert weight.moment_nm > limit  # so it needs the bearing
-    assert _tilt_moment(assembly.layout, link_bodies(scanner, assembly)).severity == "ok"
+    assert _tilt_moment(assembly.layout, link_bodies(assembly)).severity == "ok"
     left_out = [
         entry.what for entry in assembly.layout.left_out if entry.unit == "parts" and entry.what not in ASKED_FOR
     ]
@@ -161,12 +161,12 @@ def test_none_of_the_catalogue_fits(parts_of):
     scanner = replace(scanner_for(*ROLLING), bearings=())
     layout, with_bearing = laid_out(scanner), parts_of(scanner_for(*ROLLING))
     assert drive_of(scanner).of(BearingCage) is None
-    check = _tilt_moment(layout, link_bodies(scanner, with_bearing))
+    check = _tilt_moment(layout, link_bodies(with_bearing))
     assert check.severity == "error" and "none of the catalogue fits" in check.hint
 
 
 def _tilt_moment(layout, bodies):
-    return next(check for check in mechanics_checks(layout, bodies) if check.code == "tilt_moment")
+    return next(check for check in load_checks(layout, bodies) if check.code == "tilt_moment")
 
 
 def test_a_case_without_ears_around_the_flange_is_refused():

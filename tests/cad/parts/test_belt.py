@@ -15,7 +15,7 @@ from scanners import CAPSULE, digest_of, mount_offset_mm, scanner_at
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.scenes import scenes_of
 from scanwright.cad.checks.printing import thin_walls
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.checks.run import run_checks
 from scanwright.cad.drawings.files import drawing_of
 from scanwright.cad.drawings.write import Words, drawn_on
@@ -26,8 +26,7 @@ from scanwright.cad.geometry.holes import rounds_of
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, belt_shaft_bend, carrier_forces, press_newton
 from scanwright.cad.layout.belt.sizing import QUARTERS
-from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners
-from scanwright.cad.layout.belt.tower import tower_foot_of
+from scanwright.cad.layout.belt.stack import TRAVEL, BeltStack, drive_corners, tower_foot_of
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
@@ -57,7 +56,7 @@ def made(parts_of):
     scanner = scanner_for()
     assembly = parts_of(scanner)
     meshes = {n: trimesh.Trimesh(m.vertices, m.faces, process=False) for n, m in assembly.meshes().items()}
-    checks, shadow = run_checks(scanner, assembly, lambda _: None)
+    checks, shadow = run_checks(assembly, lambda _: None)
     found = {(check.code, check.subject): check for check in checks}
     return SimpleNamespace(
         scanner=scanner, assembly=assembly, stack=assembly.layout.stack, meshes=meshes, checks=found, shadow=shadow
@@ -301,7 +300,7 @@ def test_the_belt_holds_as_two_springs(made):
 
 
 def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
-    assembly, scanner = made.assembly, made.scanner
+    assembly = made.assembly
     joints = assembly.layout.joints
     found = {(joint.part, joint.onto): (joint.screw.name, joint.count, joint.fixing) for joint in joints}
     assert found == {
@@ -318,7 +317,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         ("base_mount", "bearing_tower"): ("M3", 4, "trap"),
         ("base_mount", "deck"): ("M4", 4, "deck"),
     }
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0" * 12)
+    text = instructions_text(assembly, scenes_of(assembly), [])
     titles = re.findall(r"^## \d+\. (.*)$", text, re.M)
     assert len(titles) == 15 and not [title for title in titles if " to " in title]  # no joint was left over
     assert "{" not in text and len(re.findall(r"\*\*\d+ x ISO", text)) == len(joints)
@@ -329,7 +328,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         and "groove of the hub is over the groove" in text
     )
     masses = dict.fromkeys(assembly.made, 1.0)
-    rows = {item.part: item for item in items_of(scanner, assembly, joints, masses, "0" * 12)}
+    rows = {item.part: item for item in items_of(assembly, masses)}
     assert (rows["bearing"].quantity, rows["bearing"].total_usd) == (2, 16.0)
     assert rows["belt"].supplier_number == "GT2-6, 140 teeth, 280 mm"
     assert rows["counterweight"].kind == "sawn" and "2 threads M4" in rows["counterweight"].note
@@ -349,7 +348,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
 
 
 def test_the_drawing_of_the_shaft_asks_for_the_fit_of_its_bearings(made):
-    sheet = drawing_of("main_shaft", made.scanner, made.assembly, 80.0, "0" * 12)
+    sheet = drawing_of("main_shaft", made.assembly, 80.0)
     said = [item.text for item in drawn_on(sheet) if isinstance(item, Words)]
     # ISO 286: f7 of 25 mm is -20 to -41 um; the hub's bore is a print, the collar meets nothing
     threads = [text for text in said if text.startswith("Ø2.5 THRU, TAPPED M3, RADIAL")]
@@ -369,7 +368,7 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
     """Of the pulleys: teeth and bore; of the tower: the seats. What is off the axis is measured from the horn's."""
     said = {}
     for name in ("drive_pulley", "bearing_tower"):
-        sheet = drawing_of(name, made.scanner, made.assembly, 1.0, "0" * 12)
+        sheet = drawing_of(name, made.assembly, 1.0)
         said[name] = [item.text for item in drawn_on(sheet) if isinstance(item, Words)]
     assert said["bearing_tower"].count("Ø37.1  ±0.1") == 2  # 37 to 37.2 mm around 61805
     seat = "Ø37.1 ±0.1: seat of 61805-2RS, from size for size to a sliding fit, as printed, sanded or reamed to it."
@@ -386,9 +385,9 @@ def test_what_a_print_must_keep_stands_on_its_sheet(made):
 
 
 def test_the_frame_chain_names_the_servo_beside_the_axis(made):
-    from scanwright.cad.assembly.masses import link_bodies
+    from scanwright.cad.assembly.assembly import link_bodies
 
-    drive, bodies = made.assembly.layout.drive, link_bodies(made.scanner, made.assembly)
+    drive, bodies = made.assembly.layout.drive, link_bodies(made.assembly)
     servo, rot = bodies["servo"], bodies["rot"]
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
     horn = drive.stack.servo_origin()
@@ -508,7 +507,7 @@ def test_nuts_of_the_standard_go_into_the_tower_and_hold():
     assert lengths[("drive_plate", "bearing_tower")] == ("trap", "ISO 4762 M4 x 16", 4)
     assert lengths[("base_mount", "bearing_tower")] == ("trap", "ISO 4762 M3 x 12", 4)
     assert "bearing_tower" not in {f.subject for f in without_traps(scanner.printer, list(joints.values()))}
-    sheet = drawing_of("bearing_tower", scanner, assembly, 1.0, "0" * 12)
+    sheet = drawing_of("bearing_tower", assembly, 1.0)
     said = {item.text for item in drawn_on(sheet) if isinstance(item, Words)}
     assert {
         "Hexagons under the arms for nuts M4: 7.2 across flats.",

@@ -2,18 +2,18 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scanners import GROUND_AHEAD, RING, UPRIGHT, digest_of, scanner_at
 
 from scanwright.cad.assembly.make import make_parts
+from scanwright.cad.assembly.scenes import steps_of
 from scanwright.cad.assembly.shadow import PartsWorkshop
-from scanwright.cad.assembly.steps import steps_of
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
 from scanwright.cad.checks.products import module_checks
 from scanwright.cad.files.bom import items_of
-from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import LIDAR
 from scanwright.cad.layout.placement import placement_of
 from scanwright.design.errors import BuildError
@@ -27,9 +27,7 @@ def scanner_for(angles, modules, ring=RING):
 
 
 def bought(assembly):
-    scanner = assembly.layout.scanner
-    masses = dict.fromkeys(assembly.made, 1.0)
-    return items_of(scanner, assembly, assembly.layout.joints, masses, digest_of(scanner))
+    return items_of(assembly, dict.fromkeys(assembly.made, 1.0))
 
 
 ON_TRIPOD = scanner_for(GROUND_AHEAD, Modules(tripod_foot=True))
@@ -77,8 +75,10 @@ def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_
     assert ("base_mount", "deck") not in joints
     assert of_mount.traps and of_tripod.traps and of_tripod.count == 1
     assert LIDAR in hanging_on(on_tripod, of_tripod) and "base_mount" in hanging_on(on_tripod, of_tripod)
-    assert of_mount.length_mm <= FOOT_THICKNESS + on_tripod.layout.deck.tripod.thickness  # nothing stands out below
-    said = [check for check in retention_checks(on_tripod.layout.scanner, on_tripod) if "tripod" in check.message]
+    assert (
+        of_mount.length_mm <= on_tripod.layout.deck.foot_mm + on_tripod.layout.deck.tripod.thickness
+    )  # nothing stands out below
+    said = [check for check in retention_checks(on_tripod) if "tripod" in check.message]
     assert {check.code for check in said} == {"retention", "screw"}
     assert {check.severity for check in said} == {"ok"}
 
@@ -139,7 +139,11 @@ def test_the_search_goes_on_to_the_next_setting_where_a_bed_is_too_small():
 def test_a_module_that_the_task_requires_and_that_has_no_place_is_an_error():
     asked, plain = (scanner_for(GROUND_AHEAD, modules) for modules in (Modules(tripod_foot=True), NO_MODULES))
     left = (LeftOut("tripod_foot", "no tripod holds it", 1, "parts"),)
-    (failed,) = module_checks(asked, left)
+
+    def checked(scanner, left_out):
+        return module_checks(SimpleNamespace(layout=SimpleNamespace(scanner=scanner, left_out=left_out)))
+
+    (failed,) = checked(asked, left)
     assert (failed.severity, failed.code, failed.subject) == ("error", "module", "tripod_foot")
     assert "no tripod holds it" in failed.message
-    assert module_checks(plain, left) == [] and module_checks(asked, ()) == []
+    assert checked(plain, left) == [] and checked(asked, ()) == []

@@ -9,11 +9,11 @@ from scanners import TILTED, bare_linkage, scanner_at
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.assembly.scenes import scenes_of
-from scanwright.cad.checks.remarks import without_traps
+from scanwright.cad.checks.products import without_traps
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.labels.fit_coupon import fit_coupon
+from scanwright.cad.labels.fit_coupon import coupon_plate
 from scanwright.cad.layout.direct.cage import nut_fits
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
@@ -69,14 +69,14 @@ def test_a_nut_drops_into_a_boss_before_the_ring_comes(nutted):
 
 
 def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
-    scanner, assembly, _, joints = nutted
+    _, assembly, _, joints = nutted
     trapped = {(joint.part, joint.onto): joint for joint in joints if joint.traps}
     cage = trapped[("bearing_cage", "slip_ring_adapter")]
     assert len(trapped) == 1 and (cage.count, cage.fixing) == (4, "trap")
     assert cage.length_mm >= cage.grip_mm + 3.0 + HEIGHT - 0.1  # the leg, the wall, the nut
-    items = items_of(scanner, assembly, joints, dict.fromkeys(assembly.made, 1.0), "0123456789ab")
+    items = items_of(assembly, dict.fromkeys(assembly.made, 1.0))
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 4
-    text = instructions_text(scanner, assembly, scenes_of(assembly, joints), [], "0123456789ab")
+    text = instructions_text(assembly, scenes_of(assembly), [])
     assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their pockets" in text
     assert without_traps(PRINTER, joints) == []
     core = thread_in_part(M3, PRINTER, nut_fits=False)
@@ -106,7 +106,7 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
 
 def test_the_coupon_of_such_a_profile_has_pockets(made):
     scanner = replace(made.scanner, printer=PRINTER)
-    coupon, trap = fit_coupon(scanner, made.result.assembly.layout.stack), trap_of(M3, PRINTER)
+    coupon, trap = coupon_plate(scanner, made.result.assembly.layout.stack), trap_of(M3, PRINTER)
     holes = [hole for hole in rounds_of(coupon) if hole.hole and abs(hole.diameter - trap.hole) < 1e-6]
     under = sorted((h for h in holes if h.length < 1.5), key=lambda hole: hole.low[0])
     assert len(under) == 5 and {round(hole.length, 6) for hole in under} == {1.0}

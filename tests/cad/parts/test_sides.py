@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from benchmarks.cad.combinations import screws_without_a_hole
-from scanwright.cad.assembly.bought_shapes import lidar_body, lidar_cable
+from scanwright.cad.assembly.bought import lidar_body, lidar_cable
 from scanwright.cad.layout.envelope import side_walls
+from scanwright.cad.layout.joints import screw_patterns
 from scanwright.cad.layout.placement import placement_of
-from scanwright.cad.layout.screw_patterns import screw_patterns
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.parts.linkage.sub_plate import sub_plate
 from scanwright.cad.screws import SCREWS

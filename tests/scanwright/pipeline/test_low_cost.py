@@ -20,9 +20,9 @@ def low_cost(parts_of):
 
 @pytest.fixture(scope="module")
 def bought(low_cost):
-    assembly, digest = low_cost.assembly, low_cost.assembly.layout.digest
+    assembly = low_cost.assembly
     masses = {name: solid.Volume() * 1.3e-3 for name, solid in assembly.made.items()}  # of the densest plastic
-    return items_of(low_cost.scanner, assembly, assembly.layout.joints, masses, digest)
+    return items_of(assembly, masses)
 
 
 def test_all_that_is_made_is_printed(low_cost):
@@ -43,7 +43,7 @@ def test_its_list_adds_up_to_less_than_300_dollars_where_one_asks_around(bought)
 
 
 def test_no_check_fails_and_no_part_is_in_the_fan(low_cost):
-    checks, _ = run_checks(low_cost.scanner, low_cost.assembly, no_progress)
+    checks, _ = run_checks(low_cost.assembly, no_progress)
     assert [check.message for check in checks if check.severity == "error"] == []
     hidden = [check.value for check in checks if check.code.startswith("beams_")]
     assert hidden and max(hidden) == 0

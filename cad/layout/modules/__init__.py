@@ -1,1 +1,0 @@
-"""Numbers of optional parts that a task may require. No kernel."""
