@@ -127,7 +127,7 @@ CHANGES = {
     "tilt_moment": STRONGER,
     "axial_load": STRONGER,
     "bearing_load": LIGHTER,
-    "belt_tension": f"take a longer period_s in [motion], or {LIGHTER}",
+    "belt_tension": f"take a longer period_s in [motion], a ring with a bore (slip_ring), or {LIGHTER}",
     "waist_torque": "choose a servo with a smaller stall torque (servo)",
     "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
     "retention": "if a printed part yields, choose a printer profile with nuts or inserts (printer); otherwise a servo "
