@@ -105,17 +105,20 @@ def _of_joint(assembly: Assembly, joint: Joint) -> Iterator[Finding]:
 def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
     body = together_of(assembly, hanging)
     force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
-    shaft, cage, brace = assembly.layout.drive.shaft, assembly.layout.drive.of(BearingCage), None
+    shaft, cage = assembly.layout.drive.shaft, assembly.layout.drive.of(BearingCage)
+    brace, bears = None, ""
     if cage is not None and (shaft in hanging) != (BEARING_CAGE in hanging):
         at, carried_kg = _borne(assembly, cage)
-        brace = at, (-carried_kg if shaft in hanging else carried_kg) / body.mass_kg
+        share = carried_kg / body.mass_kg
+        brace = at, -share if shaft in hanging else share
+        bears = f" {'less' if shaft in hanging else 'and'} {share * force:.0f} N by the bearing"
     pull, push = worst_shares(joint, body.centre_m, brace)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
     first = min(margins, key=margins.__getitem__)
     nut = {"trap": " and nuts in it", "nut": " and nuts", "deck": " and nuts"}.get(joint.fixing, "")
     what = (
         f"{joint.count} x {joint.screw.name} into {joint.onto}{nut} carry {body.mass_kg:.2f} kg at {SHOCK_G:g} g "
-        f"({force:.0f} N, worst direction, no friction); first yields {first}: margin"
+        f"({force:.0f} N{bears}, worst direction, no friction); first yields {first}: margin"
     )
     check = at_least("retention", margins[first], LEAST_MARGIN, "times", joint.part, what)
     return replace(check, severity="warning") if 1 <= margins[first] < LEAST_MARGIN else check
