@@ -19,9 +19,9 @@ from pathlib import Path
 
 SEARCH, SOLIDS = "start and search", "kernel, solids and what they hide"
 STAGES = {
-    "parts of": SOLIDS,
+    "waiting for": SOLIDS,
+    "beams blocked": SOLIDS,
     "loading": SOLIDS,
-    "making the parts": SOLIDS,
     "engraving": "labels",
     "meshing": "meshes, STEP and STL of the parts",
     "writing assembly.step": "meshes, STEP and STL of the parts",

@@ -6,9 +6,8 @@ not checked; `cad.parts.linkage.alignment_linkage` makes the printed part.
 
 import cadquery as cq
 import manifold3d
-import numpy as np
 
-from scanwright.cad.geometry.mesh import TriMesh, mesh_of
+from scanwright.cad.geometry.mesh import TriMesh, mesh_of, of_manifold
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.linkage.alignment_linkage import shapes_of
 
@@ -22,8 +21,7 @@ def draft_linkage(p: AlignmentLinkage) -> TriMesh:
     free_space = _together(shapes.free_space)
     body = (_solid(shapes.plate) + _solid(shapes.neck)) - free_space - _together(shapes.fins)
     carrying = max(body.decompose(), key=lambda piece: float(piece.volume()))  # the piece that holds the plate
-    mesh = ((carrying + _solid(shapes.hub)) - free_space - _together(shapes.holes)).to_mesh64()
-    return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
+    return of_manifold((carrying + _solid(shapes.hub)) - free_space - _together(shapes.holes))
 
 
 def coarse_mesh(shape: cq.Shape) -> TriMesh:
@@ -32,8 +30,7 @@ def coarse_mesh(shape: cq.Shape) -> TriMesh:
 
 
 def _solid(shape: cq.Shape) -> manifold3d.Manifold:
-    mesh = coarse_mesh(shape)
-    return manifold3d.Manifold(manifold3d.Mesh64(mesh.vertices, mesh.faces.astype(np.uint64)))
+    return coarse_mesh(shape).manifold()
 
 
 def _together(shapes: list[cq.Shape]) -> manifold3d.Manifold:

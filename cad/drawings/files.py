@@ -77,7 +77,8 @@ def _making(process: Process, printer: Printer, part: Part) -> list[str]:
     return [
         f"Clearances of {printer.name} are in the model: screws {number(printer.screw_clearance_mm)}, "
         f"fits {number(printer.fit_clearance_mm)} on the diameter.",
-        "Printed in the pose of its print file. Tight screw holes drilled to size; all else as printed.",
+        "Printed in the pose of its print file, which also has the engraved label.",
+        "Tight screw holes drilled to size; all else as printed.",
     ]
 
 

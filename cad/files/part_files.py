@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """One made part: volume and mass, box in the rotation frame."""
+    """One made part: volume and mass without its label, box in the rotation frame."""
 
     name: str
     volume_mm3: float
@@ -76,12 +76,11 @@ def build_parts(scanner: Scanner, assembly: Assembly, folder: Path, progress: Pr
     meshes_of_parts: dict[str, TriMesh] = {}
     progress("engraving the labels")
     labels = labelled_parts(assembly)
-    made = assembly.made | labels.parts
-    for number, (name, solid) in enumerate(made.items()):
-        progress(f"meshing and writing {name}", number / len(made))
+    for number, (name, solid) in enumerate(assembly.made.items()):
+        progress(f"meshing and writing {name}", number / len(assembly.made))
         part = assembly.parts[name]
-        mesh = labels.meshes[name] if name in labels.meshes else checked(assembly.mesh(name), solid, name)
-        meshes_of_parts[name] = mesh
+        plain = checked(assembly.mesh(name), solid, name)
+        mesh = meshes_of_parts[name] = labels.meshes.get(name, plain)
         text = step_text(alone(name, solid, part.colour), f"{name} config={digest}")
         files[f"parts/{name}.step"] = text.encode("ascii")
         files[f"parts/{name}.stl"] = stl_bytes(mesh, name, digest)

@@ -8,7 +8,6 @@ everything is renumbered depth first.
 import hashlib
 import re
 import tempfile
-from graphlib import TopologicalSorter
 from pathlib import Path
 
 import cadquery as cq
@@ -87,7 +86,7 @@ def _filled(entity: Entity, words: dict[int, str]) -> str:
 def _digests(entities: dict[int, Entity]) -> dict[int, str]:
     """Return the Merkle hash of every entity, independent of their numbers; unordered lists are sorted."""
     digest: dict[int, str] = {}
-    for name in TopologicalSorter({name: targets for name, (_, targets) in entities.items()}).static_order():
+    for name in _children_first(entities):
         if entities[name][0].startswith(UNORDERED):
             entities[name] = _with_sorted_lists(entities[name], digest)
         text = _readable(_filled(entities[name], digest))
@@ -100,6 +99,19 @@ def _with_sorted_lists(entity: Entity, digest: dict[int, str]) -> Entity:
         return "(" + ",".join(sorted(match[1].split(","), key=lambda item: digest[int(item[1:])])) + ")"
 
     return _entity(_LIST.sub(in_order, _filled(entity, {number: f"#{number}" for number in entity[1]})))
+
+
+def _children_first(entities: dict[int, Entity]) -> list[int]:
+    """Return every entity once, after all that it refers to."""
+    order: dict[int, None] = {}
+    for first in entities:
+        stack = [first]
+        while stack:
+            waiting = [target for target in entities[stack[-1]][1] if target not in order]
+            stack += waiting
+            if not waiting:
+                order[stack.pop()] = None
+    return list(order)
 
 
 def _parents_first(roots: list[int], entities: dict[int, Entity]) -> list[int]:

@@ -35,9 +35,8 @@ def export_scanner(
     progress("writing print files")
     printed = {part: on_bed(mesh, assembly.print_pose(part)) for part, mesh in made.meshes.items() if part not in metal}
     progress("making the fit coupon")
-    coupon = checked_mesh(fit_coupon(scanner, assembly.layout.stack), FIT_COUPON)
     patterns = screw_patterns(joints, assembly.layout.stack.R())
-    first = {FIT_COUPON: coupon}
+    first = {FIT_COUPON: fit_coupon(scanner, assembly.layout.stack)}
     if (plate := make_test_plate(scanner, patterns)) is not None:
         first[TEST_PLATE] = checked_mesh(plate, TEST_PLATE)
     tried = {name: on_bed(mesh, print_pose(mesh, scanner.printer.bed_mm)) for name, mesh in first.items()}

@@ -42,8 +42,8 @@ class TriMesh:
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def manifold(self) -> manifold3d.Manifold:
-        """Return the mesh for booleans and slices, in single precision."""
-        return manifold3d.Manifold(manifold3d.Mesh(self.vertices.astype(np.float32), self.faces.astype(np.uint32)))
+        """Return the mesh for booleans and slices."""
+        return manifold3d.Manifold(manifold3d.Mesh64(self.vertices, self.faces.astype(np.uint64)))
 
     def is_closed(self) -> bool:
         """Return whether every edge is shared by exactly two triangles in opposite directions."""
@@ -55,7 +55,17 @@ class TriMesh:
 
 def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> TriMesh:
     """Tessellate a solid canonically, within a chord error [mm] and angle [rad]."""
-    points, triangles = _tessellated(solid, chord_error, chord_angle)
+    return _canonical(*_tessellated(solid, chord_error, chord_angle))
+
+
+def of_manifold(solid: manifold3d.Manifold) -> TriMesh:
+    """Return the canonical mesh of the result of a boolean."""
+    mesh = solid.to_mesh64()
+    return _canonical(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
+
+
+def _canonical(points: Array, triangles: NDArray[np.int64]) -> TriMesh:
+    """Return a mesh with rounded, merged and sorted vertices and faces."""
     raw = np.round(points, DECIMALS) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
     faces = index.reshape(-1)[triangles]

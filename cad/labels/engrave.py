@@ -1,29 +1,26 @@
-"""Planar faces of a solid as polygons, and grooves in them. Millimetres, rotation frame.
+"""Planar faces of a solid as polygons, and grooves in them, in its mesh. Millimetres, rotation frame.
 
-Grooves are made without a boolean, which takes seconds for a line of letters.
-
-The face gets a hole per outline, and each hole walls and a floor.
+Only meshes have lettering: a STEP file with it is ten times as large, and whoever machines, loads or changes the part
+there has no use for it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cadquery as cq
+import manifold3d
 import numpy as np
 import shapely
-import shapely.geometry
-from OCP.BRep import BRep_Builder
-from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
-from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-from OCP.gp import gp_Vec
-from OCP.TopoDS import TopoDS, TopoDS_Shell, TopoDS_Wire
 
-from scanwright.cad import solids
+from scanwright.cad.geometry.mesh import TriMesh, of_manifold
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
+from scanwright.design.errors import BuildError
 
 WIDTHS = (0.4, 0.9)  # of grooves, least and most
 DEPTHS = (0.3, 0.6)
+ABOVE = 0.05  # of a face: where a groove begins, so that no two faces coincide
+VOLUME_ERROR = 0.01  # of the grooves, relative
 HAIRLINE = 2e-3  # between the triangles of a face
 
 
@@ -106,45 +103,27 @@ def groove_of(printer: Printer) -> Groove:
     return Groove(float(np.clip(wall * 2 / 3, *WIDTHS)), float(np.clip(wall / 2, *DEPTHS)))
 
 
-def engrave(solid: cq.Solid, grooves: Sequence[tuple[Flat, Sequence[shapely.Polygon]]], depth: float) -> cq.Solid:
-    """Return the solid with grooves of one depth; outlines are inside their face and apart, in its axes."""
-    builder, shell = BRep_Builder(), TopoDS_Shell()
-    builder.MakeShell(shell)
-    for face in solid.Faces():
-        own = [(flat, outline) for flat, outlines in grooves if flat.face.isSame(face) for outline in outlines]
-        for piece in _grooved(face, own, depth) if own else [face]:
-            builder.Add(shell, piece.wrapped)
-    shell.Closed(True)
-    return cq.Solid.makeSolid(cq.Shell(shell))
+def engrave(
+    mesh: TriMesh, grooves: Sequence[tuple[Flat, Sequence[shapely.Polygon]]], depth: float, part: str
+) -> TriMesh:
+    """Return the mesh with grooves of one depth; outlines are inside their face and apart, in its axes.
 
-
-def _grooved(face: cq.Face, grooves: Sequence[tuple[Flat, shapely.Polygon]], depth: float) -> list[cq.Face]:
-    """Return the faces that replace a face: itself with holes, the islands of letters, walls and floors.
-
-    Walls must share their edges with their neighbours: nothing here may copy or repair a shape.
+    Raises:
+        BuildError: the grooves spoil the part.
     """
-    rest = BRepBuilderAPI_MakeFace(face.wrapped)
-    pieces: list[cq.Face] = []
-    for flat, outline in grooves:
-        ring = shapely.geometry.polygon.orient(outline)  # counter-clockwise from outside, its own holes clockwise
-        outer = _wire(ring.exterior, flat)
-        letter = BRepBuilderAPI_MakeFace(outer, True)
-        for hole in ring.interiors:
-            inner = _wire(hole, flat)
-            letter.Add(inner)
-            pieces.append(cq.Face(BRepBuilderAPI_MakeFace(_reversed(inner), True).Face()))
-        top = cq.Face(letter.Face())
-        into = gp_Vec(*(-depth * flat.frame[:, 2]).tolist())
-        prism = cq.Shape.cast(BRepPrimAPI_MakePrism(top.wrapped, into).Shape())
-        pieces += [cq.Face(wall.wrapped.Reversed()) for wall in prism.Faces() if not wall.isSame(top)]
-        rest.Add(_reversed(outer))
-    return [cq.Face(rest.Face()), *pieces]
+    tools = [_tool(flat, outlines, depth) for flat, outlines in grooves]
+    cut = mesh.manifold() - manifold3d.Manifold.batch_boolean(tools, manifold3d.OpType.Add)
+    engraved = of_manifold(cut)
+    wanted = depth * sum(outline.area for _, outlines in grooves for outline in outlines)
+    lost = mesh.volume() - engraved.volume()
+    if not engraved.is_closed() or abs(lost - wanted) > VOLUME_ERROR * wanted or len(cut.decompose()) != 1:
+        raise BuildError(f"{part}: lettering: grooves {depth:g} mm deep do not leave one closed body")
+    return engraved
 
 
-def _wire(ring: shapely.LinearRing, flat: Flat) -> TopoDS_Wire:
-    corners: Array = flat.at(np.asarray(ring.coords)[:-1])
-    return cq.Wire.makePolygon([solids.vector(corner) for corner in corners], close=True).wrapped
-
-
-def _reversed(wire: TopoDS_Wire) -> TopoDS_Wire:
-    return TopoDS.Wire_s(wire.Reversed())
+def _tool(flat: Flat, outlines: Sequence[shapely.Polygon], depth: float) -> manifold3d.Manifold:
+    """Return the body that the grooves of one face take off."""
+    rings = [np.asarray(ring.coords)[:-1] for one in outlines for ring in (one.exterior, *one.interiors)]
+    prism = manifold3d.CrossSection(rings, manifold3d.FillRule.EvenOdd).extrude(depth + ABOVE)
+    T_rot_face = np.column_stack([flat.frame, flat.origin - depth * flat.frame[:, 2]])
+    return prism.transform(T_rot_face)

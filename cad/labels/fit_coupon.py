@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
 from scanwright.cad.labels.engrave import Flat, engrave, flat_at, groove_of
 from scanwright.cad.labels.lettering import letters, text_width
 from scanwright.cad.layout.hub import Hub
@@ -67,10 +68,22 @@ class _Row:
         return self.pitch + LETTER + WALL
 
 
-def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
-    """Make the coupon of one scanner's printer."""
+def fit_coupon(scanner: Scanner, stack: Hub) -> TriMesh:
+    """Return the mesh of the coupon of one scanner's printer."""
+    rows, plate, groove = _rows(scanner, stack), coupon_plate(scanner, stack), groove_of(scanner.printer)
+    height = plate.BoundingBox().zmax
+    top = flat_at(plate, np.array([0.5, 0.5, height]), np.array([0.0, 0.0, 1.0]))
+    assert top is not None
+    grooves = []
+    for row, (left, _, high) in zip(rows, _laid_out(rows)[2], strict=True):
+        grooves += _letters(row.words, np.array([left, high, height]), groove.width, top)
+    return engrave(checked_mesh(plate, FIT_COUPON), [(top, grooves)], groove.depth, FIT_COUPON)
+
+
+def coupon_plate(scanner: Scanner, stack: Hub) -> cq.Solid:
+    """Make the coupon without its words."""
     printer, rows = scanner.printer, _rows(scanner, stack)
-    groove, trap = groove_of(printer), trap_of(NUT, printer)
+    trap = trap_of(NUT, printer)
     thickness = max(THICKNESS, 0.0 if trap is None else trap.depth + FLOOR)
     width, depth, places = _laid_out(rows)
     holes: list[cq.Solid] = []
@@ -84,14 +97,7 @@ def fit_coupon(scanner: Scanner, stack: Hub) -> cq.Solid:
                 bore = trap.hole
             holes.append(solids.upright(bore / 2, -1.0, thickness + 1.0, x, y))
     with building(FIT_COUPON, "plate and holes", "rows", len(rows)) as checked:
-        plate = checked(solids.box((0.0, 0.0, 0.0), (width, depth, thickness)).cut(*holes))
-    with building(FIT_COUPON, "lettering", "rows", len(rows)) as checked:
-        top = flat_at(plate, np.array([0.5, 0.5, thickness]), np.array([0.0, 0.0, 1.0]))
-        assert top is not None
-        grooves = []
-        for row, (left, _, high) in zip(rows, places, strict=True):
-            grooves += _letters(row.words, np.array([left, high, thickness]), groove.width, top)
-        return checked(engrave(plate, [(top, grooves)], groove.depth))
+        return checked(solids.box((0.0, 0.0, 0.0), (width, depth, thickness)).cut(*holes))
 
 
 def _laid_out(rows: list[_Row]) -> tuple[float, float, list[tuple[float, float, float]]]:

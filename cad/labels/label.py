@@ -1,8 +1,8 @@
 """Engraved label of a printed part: task, angles and configuration; FRONT at the lidar's front. Millimetres.
 
-The label is on the largest flat face with enough area and a wall behind it, preferably one that can be read on the
-assembled scanner, else one that touches nothing there. A small part gets the configuration alone or no label. Drawings,
-screws and checks use the part without its label.
+The label is in STL, 3MF and GLB, not in STEP; drawings, screws and checks use the part without it. It is on the largest
+flat face with enough area and a wall behind it, preferably one that can be read on the assembled scanner, else one that
+touches nothing there. A small part gets the configuration alone or no label.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,10 +13,9 @@ import cadquery as cq
 import numpy as np
 import shapely
 
-from scanwright.cad import solids
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.geometry.holes import Piercing
-from scanwright.cad.geometry.mesh import TriMesh, checked_mesh
+from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.labels.engrave import Flat, Groove, engrave, flat_at, flats_of, groove_of
 from scanwright.cad.labels.lettering import Lettering, Place
 from scanwright.cad.parts.part_spec import PartSpec
@@ -76,8 +75,7 @@ def _deck(assembly: Assembly) -> Array:
 class Labelled:
     """The labels of one scanner."""
 
-    parts: dict[str, cq.Solid] = field(default_factory=dict)  # with their labels, by name
-    meshes: dict[str, TriMesh] = field(default_factory=dict)  # of these
+    meshes: dict[str, TriMesh] = field(default_factory=dict)  # with their labels, by part
     left_out: list[LeftOut] = field(default_factory=list)  # labels that did not fit
 
 
@@ -136,7 +134,7 @@ def labelled_parts(assembly: Assembly) -> Labelled:
         words += [] if label is None else [label]
         if words:
             try:
-                done.parts[name], done.meshes[name] = engraved(solid, words, groove)
+                done.meshes[name] = engraved(assembly.mesh(name), words, groove, name)
             except BuildError as error:  # a part without its label is better than none
                 done.left_out.append(LeftOut(f"label of {name}", str(error), 1, "labels"))
     return done
@@ -166,12 +164,11 @@ def label_on(ground: Ground, texts: list[str], before: FreeDistance) -> tuple[Pl
     return None
 
 
-def engraved(solid: cq.Solid, words: Sequence[tuple[Place, Lettering]], groove: Groove) -> tuple[cq.Solid, TriMesh]:
-    """Return the part with lettering, and its mesh; BuildError if the grooves spoil it."""
-    grooves = [(place.flat, place.outlines(lines, groove.width)) for place, lines in words]
-    with solids.building("label", "lettering", "lines", [lines.lines for _, lines in words]) as checked:
-        cut = checked(engrave(solid, grooves, groove.depth))
-    return cut, checked_mesh(cut, "label")
+def engraved(mesh: TriMesh, words: Sequence[tuple[Place, Lettering]], groove: Groove, part: str) -> TriMesh:
+    """Return the mesh of a part with lettering; errors are those of `engrave`."""
+    return engrave(
+        mesh, [(place.flat, place.outlines(lines, groove.width)) for place, lines in words], groove.depth, part
+    )
 
 
 def _front(assembly: Assembly, solid: cq.Solid, height: float, groove: Groove) -> Place | None:

@@ -23,6 +23,7 @@ def save_picture(figure: Figure, path: Path, dpi: float = DPI) -> None:
     """
     with atomic_write(path, BuildError) as part:
         figure.savefig(part, format="png", dpi=dpi, metadata={"Software": None})
+    figure.set_layout_engine("none")  # the SVG keeps the layout of the PNG, which takes as long as drawing it
     with atomic_write(path.with_suffix(".svg"), BuildError) as part:
         part.write_bytes(svg_bytes(figure, dpi))
 

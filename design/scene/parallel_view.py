@@ -29,9 +29,11 @@ class Shown:
 
 def in_front(views: Sequence[Shown]) -> Shown:
     """Return the view of several bodies: in each pixel the nearest one."""
-    away_m, brightness = (np.stack(rows) for rows in zip(*((v.away_m, v.brightness) for v in views), strict=True))
-    nearest = away_m.argmin(axis=0)[None]
-    return Shown(*(np.take_along_axis(rows, nearest, axis=0)[0] for rows in (away_m, brightness)))
+    away_m, brightness = views[0].away_m.copy(), views[0].brightness.copy()
+    for view in views[1:]:
+        nearer = view.away_m < away_m
+        away_m[nearer], brightness[nearer] = view.away_m[nearer], view.brightness[nearer]
+    return Shown(away_m, brightness)
 
 
 @dataclass(frozen=True, slots=True)

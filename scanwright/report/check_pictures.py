@@ -13,7 +13,7 @@ from PIL import Image
 
 from scanwright.design.arrays import Array
 from scanwright.design.scene.parallel_view import Shown, in_front, view_of
-from scanwright.design.scene.ray_caster import build_scene
+from scanwright.design.scene.ray_caster import Scene
 from scanwright.report.build_files import png_uri
 
 SIZE_PX = 200, 150  # pixels, wide and high
@@ -34,7 +34,7 @@ PREFIXES["bearing"] = ("bearing_outer", "bearing_inner")
 class PlacedBody:
     """One body of the scanner in its place."""
 
-    triangles_m: Array  # corners of its triangles [m], shape (t, 3, 3)
+    scene: Scene  # its triangles, for every picture
     turns: bool  # whether it turns with the axis
     colour: tuple[float, ...] = (0.6, 0.6, 0.6)  # sRGB, 0 to 1
 
@@ -93,9 +93,9 @@ class CheckPictures:
 
 
 def _shown(bodies: Mapping[str, PlacedBody], size_px: tuple[int, int]) -> dict[str, Shown]:
-    corners = np.concatenate([body.triangles_m.reshape(-1, 3) for body in bodies.values()])
+    corners = np.concatenate([body.scene.triangles_m.reshape(-1, 3) for body in bodies.values()])
     view = view_of(corners, size_px, YAW_RAD, PITCH_RAD, MARGIN)
-    return {name: view.shown(build_scene(body.triangles_m)) for name, body in bodies.items()}
+    return {name: view.shown(body.scene) for name, body in bodies.items()}
 
 
 def _png(colour: Array) -> str:

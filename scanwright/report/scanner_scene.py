@@ -16,7 +16,7 @@ from scanwright.design.angles import AngleSet
 from scanwright.design.arrays import Array, Vector
 from scanwright.design.frames import apply
 from scanwright.design.motion import Sweep
-from scanwright.design.scene.ray_caster import load_triangles
+from scanwright.design.scene.ray_caster import build_scene, load_triangles
 from scanwright.design.self_occlusion import AXIS_STEPS, SelfOcclusion
 from scanwright.design.task.shapes import MeshRegion
 from scanwright.design.task.task import Task
@@ -113,7 +113,9 @@ def placed_bodies(assembly: Any) -> dict[str, PlacedBody]:
     for node in sorted(assembly.graph.nodes_geometry):
         mesh = assembly.geometry[assembly.graph.get(node)[1]]
         triangles = apply(_pose(assembly, node), mesh.vertices)[mesh.faces]
-        bodies[node] = PlacedBody(triangles, node in turning, tuple(_srgb(mesh.visual.material.baseColorFactor)))
+        bodies[node] = PlacedBody(
+            build_scene(triangles, node), node in turning, tuple(_srgb(mesh.visual.material.baseColorFactor))
+        )
     return bodies
 
 

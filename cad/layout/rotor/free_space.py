@@ -58,5 +58,7 @@ def _from_slot(points: Array, first: tuple[float, float], last: tuple[float, flo
 
 def in_hull(points: Array, corners: Array, gap: float) -> Mask:
     """Return points inside the convex hull of corners, shape (m, 3), or nearer to it than a gap."""
-    planes = ConvexHull(corners).equations
-    return np.asarray((planes[:, :3] @ points.T + planes[:, 3:]).max(axis=0) < gap)
+    inside = np.arange(len(points))
+    for *normal, offset in ConvexHull(corners).equations:  # most points fall out at the first few planes
+        inside = inside[points[inside] @ normal + offset < gap]
+    return np.isin(np.arange(len(points)), inside, assume_unique=True)

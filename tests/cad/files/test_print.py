@@ -121,7 +121,6 @@ def test_every_printed_part_has_a_file_that_a_strict_reader_takes(made):
     assert ("print/servo_shaft.3mf", "of metal: made after its STEP file") in {
         (entry.what, entry.why) for entry in made.exports[1]
     }
-    volumes = {part.name: part.volume_mm3 for part in made.result.parts}
     for file in printed:
         model = get_wrapper().CreateModel()
         reader = model.QueryReader("3mf")
@@ -136,8 +135,8 @@ def test_every_printed_part_has_a_file_that_a_strict_reader_takes(made):
         vertices = np.array([tuple(v.Coordinates) for v in part.GetVertices()])
         faces = np.array([tuple(t.Indices) for t in part.GetTriangleIndices()])
         read = trimesh.Trimesh(vertices, faces, process=False)
-        if part.GetName() in volumes:
-            assert read.volume == pytest.approx(volumes[part.GetName()], rel=1e-3)
+        if part.GetName() in made.result.meshes:
+            assert read.volume == pytest.approx(made.result.meshes[part.GetName()].volume(), rel=1e-4)
         assert read.bounds[0, 2] == 0
         assert (read.bounds[0] >= 0).all() and (read.bounds[1] <= BED).all()
         assert (read.face_normals[read.triangles_center[:, 2] < 1e-3][:, 2] < -0.999).all()  # a flat lies on the bed
@@ -147,10 +146,9 @@ def test_a_slicer_takes_a_print_file_without_repair(made):
     """All of a build: `python -m benchmarks.cad.slicer OUT`."""
     if shutil.which(PROGRAM) is None:
         pytest.skip(f"{PROGRAM} is not installed (apt-get install prusa-slicer): print files are not sliced")
-    volumes = {part.name: part.volume_mm3 for part in made.result.parts}
     found = sliced(made.folder / "print" / "slip_ring_adapter.3mf")
     assert found.closed
-    assert found.volume_mm3 == pytest.approx(volumes["slip_ring_adapter"], rel=1e-3)
+    assert found.volume_mm3 == pytest.approx(made.result.meshes["slip_ring_adapter"].volume(), rel=1e-3)
     assert found.height_mm == pytest.approx(found.size_mm[2], abs=0.3)  # a layer of its own choice
     assert found.layer_mm == made.scanner.printer.layer_mm  # it read its settings
 

@@ -13,7 +13,7 @@ from scanwright.cad.checks.products import without_traps
 from scanwright.cad.files.bom import items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.holes import rounds_of
-from scanwright.cad.labels.fit_coupon import fit_coupon
+from scanwright.cad.labels.fit_coupon import coupon_plate
 from scanwright.cad.layout.direct.cage import nut_fits
 from scanwright.cad.layout.placement import drive_of
 from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
@@ -106,7 +106,7 @@ def test_the_ears_of_a_sub_plate_hold_in_nuts_from_below(made):
 
 def test_the_coupon_of_such_a_profile_has_pockets(made):
     scanner = replace(made.scanner, printer=PRINTER)
-    coupon, trap = fit_coupon(scanner, made.result.assembly.layout.stack), trap_of(M3, PRINTER)
+    coupon, trap = coupon_plate(scanner, made.result.assembly.layout.stack), trap_of(M3, PRINTER)
     holes = [hole for hole in rounds_of(coupon) if hole.hole and abs(hole.diameter - trap.hole) < 1e-6]
     under = sorted((h for h in holes if h.length < 1.5), key=lambda hole: hole.low[0])
     assert len(under) == 5 and {round(hole.length, 6) for hole in under} == {1.0}

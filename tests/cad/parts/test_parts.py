@@ -99,7 +99,8 @@ def test_every_stl_is_one_closed_body_of_the_right_volume(built):
         assert mesh.body_count == 1, part.name
         solid = cq.importers.importStep(str(built.folder / "parts" / f"{part.name}.step")).val()
         assert len(solid.Solids()) == 1 and solid.isValid()
-        assert mesh.volume == pytest.approx(solid.Volume(), rel=1e-3)
+        assert mesh.volume == pytest.approx(built.result.meshes[part.name].volume(), rel=1e-4)
+        assert built.result.assembly.mesh(part.name).volume() == pytest.approx(solid.Volume(), rel=1e-3)
         assert part.volume_mm3 == pytest.approx(solid.Volume(), rel=1e-4)
         np.testing.assert_allclose(mesh.bounds, part.box_mm, atol=1e-3)
 

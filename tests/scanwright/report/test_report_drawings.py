@@ -8,6 +8,7 @@ import pytest
 from report_folder import ANGLES, Page, cell, drawn, own_body, picture, sphere
 
 from scanwright.design.motion import Sweep
+from scanwright.design.scene.ray_caster import build_scene
 from scanwright.design.task.task import load_task
 from scanwright.report.check_pictures import CheckPictures, PlacedBody, bodies_named
 from scanwright.report.colours import bands_to, ramp
@@ -104,7 +105,7 @@ def test_bands_double_and_reach_the_densest_direction():
 def test_a_check_knows_its_bodies():
     names = ["alignment_linkage", "base_mount", "lidar_body", "lidar_cap", "ring_rotor", "servo_case", "servo_horn"]
     turning = {"alignment_linkage", "lidar_body", "lidar_cap", "ring_rotor", "servo_horn"}
-    bodies = {name: PlacedBody(np.zeros((1, 3, 3)), name in turning) for name in [*names, "servo_shaft"]}
+    bodies = {name: PlacedBody(build_scene(np.eye(3)[None]), name in turning) for name in [*names, "servo_shaft"]}
     bought = {"UTM-30LX": "lidar", "MX-64R": "servo", "SNU11": "slip ring"}
     for where, expected in {
         "base_mount": {"base_mount"},
@@ -131,8 +132,8 @@ def test_the_picture_of_a_check_is_dark_where_its_body_is(folder):
         shot = np.asarray(picture(pictures.picture((name,))), float)
         named = shot[:, :, 0] - shot[:, :, 2] > 60
         rows, columns = np.nonzero(named)
-        every = np.concatenate([b.triangles_m.reshape(-1, 3) for b in bodies.values()])
-        own = body.triangles_m.reshape(-1, 3)
+        every = np.concatenate([b.scene.triangles_m.reshape(-1, 3) for b in bodies.values()])
+        own = body.scene.triangles_m.reshape(-1, 3)
         for axis, pixels, size, sign in ((right, columns, 200, 1), (up, rows, 150, -1)):
             whole, part = every @ axis, own @ axis
             pixel = max(np.ptp(every @ right) / 200, np.ptp(every @ up) / 150) * 1.04
