@@ -44,6 +44,7 @@ Frame = Literal["servo", "rot", "laser"]
 CAP_INSET = 1.5
 CHORDS = 0.02  # overlap of the facets of a round seat and its hole: no fit is as wide
 EAR_RECESS = 3.6  # radius of the recess around a case hole
+HORN_RECESS = 0.3  # around a horn that is sunk into its case: assumed
 BELT_GAP = 0.05  # between the tips of the teeth and the belt between its teeth
 THROUGH = 0.25  # of a plain hole around its screw
 STUB = 0.4  # between the stub of a capsule's rotor and its body
@@ -120,10 +121,13 @@ def lidar_cable(lidar: Lidar, y: float) -> cq.Solid:
 
 
 def servo_case(servo: Servo, z: float) -> cq.Solid:
-    """Return the case, its horn face at height z, with recesses and threads of its front and rear holes."""
+    """Return the case, its horn face at height z, with recesses of horn and holes, and threads."""
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
     recesses = [solids.upright(EAR_RECESS, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
     recesses += [solids.upright(EAR_RECESS, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
+    if servo.horn_thickness_mm > -z1:
+        around = servo.horn_diameter_mm / 2 + HORN_RECESS
+        recesses.append(solids.upright(around, z - servo.horn_thickness_mm - HORN_RECESS, z + z1 + 1.0))
     for pattern, inwards in ((servo.front, -1.0), (servo.rear, 1.0)):
         if pattern.kind != "through":
             low, high = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))

@@ -6,6 +6,7 @@ Constant limits are here, with their reason; limits of products, printer or layo
 from dataclasses import replace
 from typing import NamedTuple
 
+from scanwright.cad.layout.tightening import HELD_G, LEAST_MARGIN
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
 
@@ -13,8 +14,6 @@ CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at 
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
 LINKAGE_HIDES_SHARE = 0.03  # of the field of view, beyond servo, ring and shaft; J with parts accounts for it
 SHOCK_G = 5.0  # bumps and transport: assumed
-HELD_G = 2.0  # bumps that must not turn the mount: assumed
-LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
 FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
 LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
 THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is unusable

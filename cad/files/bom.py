@@ -125,7 +125,9 @@ def _screws(joints: Sequence[Joint]) -> Iterator[BomItem]:
         if joint.fixing in ("nut", "deck") or joint.traps:
             small[0, "nut", "hexagon nut", f"{screw.nut_standard} {screw.name}", ""] += joint.count
         if joint.washer_mm is not None:
-            small[1, "washer", "plain washer", f"ISO 7093 {screw.name}", ""] += joint.count
+            small[1, "washer", "plain washer", f"ISO {7093 if screw.nominal >= 3 else 7089} {screw.name}", ""] += (
+                joint.count
+            )
         if joint.inserts:
             note = f"length {INSERT_LENGTH:g}, for a hole of {screw.insert:g} mm"
             small[2, "insert", "heat-set insert", screw.name, note] += joint.count

@@ -24,16 +24,17 @@ from scanwright.design.deck_holes import Circle, Rectangle
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-FOOT_THICKNESS = 6.0
+HEAVY_G = 505.0  # mass of lidar, servo and ring (UTM-30LX on an MX-64R) from which on a mount has its full size
+FOOT_MM, BACK_MM = (4.0, 6.0), (5.0, 8.0)  # thickness of foot and back plate: least that holds its screws, and full
+PAD_HALF = (18.0, 26.0)  # of the strut on the foot: least and full
+SIZE_STEP = 0.5
 TIES_HALF = 5.5  # half of the distance of two slots of the foot: two leads fit side by side
 FROM_DECK_SCREW = 9.0  # between the slots of the foot and the middle of a deck's screw, at least
 PLUG_GAP = 12.0  # between the case and the mount's back plate, for the servo's plugs
-BACK_THICKNESS = 8.0
 BACK_MARGIN = 5.0  # of the back plate around the rear holes, at least
 RAIL_INSET = 0.8  # of the ends of a rail from those of the back plate
 RAIL_WALL = 1.3  # of a rail around the heads of its screws, at least
 USUAL = Rectangle(shape="rectangle", size_mm=(80.0, 80.0), screw="M4")  # holes of a mount, unless the task states some
-PAD_HALF = 26.0  # of the strut on the foot
 HOLE_MARGIN = 10.0  # of the foot around a hole
 FOOT_SHIFTS = (0.0, 6.0, -6.0, 12.0, -12.0, 18.0, -18.0)  # along world x and y
 FOOT_DROPS = tuple(6.0 * k for k in range(11))  # from the back plate, beyond the least height
@@ -78,6 +79,9 @@ class Deck:
     screw: Screw  # that holds the mount on the deck
     deck_holes: tuple[tuple[float, float], ...]  # along the first two axes of `rotation`
     tripod: TripodFoot | None  # plate under the mount
+    foot_mm: float  # thickness of the foot
+    back_mm: float  # thickness of the back plate
+    pad_half: float  # of the strut on the foot
     foot: tuple[float, float, float]  # half extents along world x and y, and cut of the corners
     ties: tuple[TieSeat, ...]  # slots at the sides of the foot, frame of the deck
     joints: tuple[Joint, ...]  # of a servo or frame on a flat deck without a mount
@@ -103,19 +107,22 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
     margin = max(BACK_MARGIN, mounted.screw.driver_radius + rail_wall(scanner.printer) + RAIL_INSET)
     half = (max(xs) + margin, (max(ys) - min(ys)) / 2 + margin)
     back = np.array([0.0, (max(ys) + min(ys)) / 2, mounted.rear - PLUG_GAP])
-    tripod = tripod_foot_of(screw, scanner.printer, FOOT_THICKNESS) if scanner.modules.tripod_foot else None
+    foot_mm, back_mm, pad_half = _sizes(scanner)
+    tripod = tripod_foot_of(screw, scanner.printer, foot_mm) if scanner.modules.tripod_foot else None
     bare = scanner.deck is None and tripod is None
     flat = mounted.on_flat_deck and bare and bool(R[2, 2] > 1.0 - 1e-9)
     if flat:
         centre = np.array([0.0, 0.0, mounted.rear])
     else:
         rotor_radius = drive.envelope.radius(drive.stack.sub_plate)
-        height = _height_of_back(rotor_radius, mounted, normal, back, half)
+        corners = back + box_corners(((-half[0], -half[1], -back_mm), (*half, 0.0)))
+        height = _height_of_back(rotor_radius, mounted, normal, back, corners, foot_mm)
         axes = np.stack([along, np.cross(normal, along), normal], axis=1)
-        centre = _foot_centre(screw, mounted, deck_holes, back - height * normal, axes, _plate_corners(back, half))
+        pad = box_corners(((-pad_half, -pad_half, 0.0), (pad_half, pad_half, foot_mm))) @ axes.T
+        centre = _foot_centre(screw, mounted, deck_holes, back - height * normal, axes, corners, pad)
     upwards, depth = upright_axes(mounted.holes, mounted.rear - DECK_MM, 1.0), mounted.thread_mm
     joints = (Joint(DECK, mounted.onto, mounted.fixing, mounted.screw, upwards, grip_mm=DECK_MM, thread_mm=depth),)
-    foot = _foot(pattern, screw)
+    foot = _foot(pattern, screw, pad_half)
     offset = R @ ((0.0 if tripod is None else tripod.thickness) * normal - centre)
     offset[np.abs(offset) < 1e-9] = 0.0
     return Deck(
@@ -129,29 +136,48 @@ def deck_of(scanner: Scanner, drive: DriveLayout) -> Deck:
         screw=screw,
         deck_holes=deck_holes,
         tripod=tripod,
+        foot_mm=foot_mm,
+        back_mm=back_mm,
+        pad_half=pad_half,
         foot=foot,
-        ties=() if flat else _foot_ties(foot, deck_holes),
+        ties=() if flat else _foot_ties(foot, foot_mm, pad_half, deck_holes),
         joints=joints if flat else (),
     )
 
 
-def _foot_ties(foot: tuple[float, float, float], deck_holes: tuple[tuple[float, float], ...]) -> tuple[TieSeat, ...]:
+def _sizes(scanner: Scanner) -> tuple[float, float, float]:
+    """Return the thickness of foot and back plate, and half the side of the strut's pad, by the load.
+
+    Plates keep their natural frequency under a smaller load with the cube root of it, a strut with the fourth root.
+    """
+    ring = 0.0 if scanner.slip_ring is None else scanner.slip_ring.mass_g
+    share = min(1.0, (scanner.lidar.mass_g + scanner.servo.mass_g + ring) / HEAVY_G)
+    foot, back = (
+        max(least, SIZE_STEP * math.ceil(full * math.cbrt(share) / SIZE_STEP - 1e-9))
+        for least, full in (FOOT_MM, BACK_MM)
+    )
+    return foot, back, max(PAD_HALF[0], SIZE_STEP * math.ceil(PAD_HALF[1] * share**0.25 / SIZE_STEP - 1e-9))
+
+
+def _foot_ties(
+    foot: tuple[float, float, float], foot_mm: float, pad_half: float, deck_holes: tuple[tuple[float, float], ...]
+) -> tuple[TieSeat, ...]:
     """Return seats at the middle of each side of the foot, unless a screw is there; the groove is below."""
     x, y, _ = foot
     seats = [
         TieSeat(
             azimuth=turn * math.pi / 2,
-            inner=PAD_HALF,
+            inner=pad_half,
             first=half - SLOT_WALL - SLOT_ALONG,
             low=0.0,
-            high=FOOT_THICKNESS,
+            high=foot_mm,
             half=TIES_HALF,
             grooved=True,
             below=True,
         )
         for turn, half in enumerate((x, y, x, y))
     ]
-    return tuple(seat for seat in seats if seat.first > PAD_HALF + 1.0 and not _near_screw(seat, deck_holes))
+    return tuple(seat for seat in seats if seat.first > pad_half + 1.0 and not _near_screw(seat, deck_holes))
 
 
 def _near_screw(seat: TieSeat, deck_holes: tuple[tuple[float, float], ...]) -> bool:
@@ -166,20 +192,14 @@ def rail_wall(printer: Printer) -> float:
 
 
 def _height_of_back(
-    rotor_radius: float, mounted: Mounted, normal: Array, back: Array, half: tuple[float, float]
+    rotor_radius: float, mounted: Mounted, normal: Array, back: Array, plate: Array, foot_mm: float
 ) -> float:
     """Return the height of the back plate's centre above the deck that keeps everything FREE above the foot."""
-    below = [float(-(point @ normal)) for point in (*mounted.corners, *_plate_corners(back, half))]
+    below = [float(-(point @ normal)) for point in (*mounted.corners, *plate)]
     sideways = float(np.hypot(normal[0], normal[1]))
     below += [around * sideways - z * float(normal[2]) for around, z in mounted.discs]
     below.append(rotor_radius + SWEEP_MARGIN)
-    return float(np.ceil(max(below) + float(back @ normal) + FOOT_THICKNESS + FREE))
-
-
-def _plate_corners(back: Array, half: tuple[float, float]) -> Array:
-    """Return the corners of the back plate, shape (8, 3)."""
-    x, y = half
-    return back + box_corners(((-x, -y, -BACK_THICKNESS), (x, y, 0.0)))
+    return float(np.ceil(max(below) + float(back @ normal) + foot_mm + FREE))
 
 
 def _foot_centre(
@@ -189,6 +209,7 @@ def _foot_centre(
     below: Array,
     axes: Array,
     plate: Array,
+    pad: Array,
 ) -> Array:
     """Return the centre of the foot nearest to `below` where every driver passes; `below` if there is none.
 
@@ -197,10 +218,9 @@ def _foot_centre(
     """
     apart = mounted.screw.driver_radius + screw.driver_radius
     radius, length = KEYS_MM[screw.name]
-    heads = FOOT_THICKNESS + screw.head_height
+    heads = float((pad @ axes[:, 2]).max()) + screw.head_height
     depths = np.linspace(0.0, heads, 11)
     holes = np.array([(u, v, 0.0) for u, v in deck_holes])
-    pad = box_corners(((-PAD_HALF, -PAD_HALF, 0.0), (PAD_HALF, PAD_HALF, FOOT_THICKNESS))) @ axes.T
     load = [ConvexHull(corners).equations for corners in mounted.bodies]
 
     def passes(centre: Array) -> bool:
@@ -225,13 +245,13 @@ def _meets(planes: Array, starts: Array, along: Array, length: float, radius: fl
     return bool((enters < leaves).any())
 
 
-def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, float]:
+def _foot(pattern: Rectangle | Circle, screw: Screw, pad_half: float) -> tuple[float, float, float]:
     """Return the half extents of an octagon around all holes and the strut's pad, and the cut of its corners.
 
     Raises:
         BuildError: a hole is under the strut: no driver reaches its screw.
     """
-    least = PAD_HALF + screw.driver_radius + 1.0
+    least = pad_half + screw.driver_radius + 1.0
     near = [hole for hole in pattern.holes() if max(abs(hole[0]), abs(hole[1])) < least]
     if near:
         raise BuildError(
@@ -241,5 +261,5 @@ def _foot(pattern: Rectangle | Circle, screw: Screw) -> tuple[float, float, floa
     if isinstance(pattern, Circle):  # a regular octagon keeps the margin all around
         half = pattern.diameter_mm / 2 + HOLE_MARGIN
         return half, half, half * (2 - math.sqrt(2))
-    x, y = (max(size / 2, PAD_HALF) + HOLE_MARGIN for size in pattern.size_mm)
+    x, y = (max(size / 2, pad_half) + HOLE_MARGIN for size in pattern.size_mm)
     return x, y, 12.0

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM, HUB_GAP, HUB_HEIGHT, Axis, Hub
+from scanwright.cad.layout.hub import CROSS_M3, HUB_WALL, Axis, CrossScrew, Hub
+from scanwright.cad.layout.joints import fixing_of, shank_mm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.screws import SCREWS, Screw
 from scanwright.design.arrays import Array
@@ -19,7 +20,11 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.equivalent_settings import BOUNDS, advice
 
-PLATE_THICKNESS = 8.0
+HEAVY_G = 370.0  # mass of a lidar (UTM-30LX) from which on plate, neck and hub have their full size
+PLATE_MM = (4.0, 8.0)  # thickness of the plate: least that prints flat and stiff, and full
+PLATE_STEP = 0.5
+UNDER_SUB_PLATE = 6.0  # least of that with pockets for the lidar's screws, and nuts or inserts for the ears
+HUB_WALL_MIN = 6.0  # around a shaft: under the washers of the cross screws
 BODY_GAP = 0.6  # around the lidar's body
 CABLE_GAP = 2.0  # around its cables
 SUB_PLATE_THICKNESS = 4.0  # without walls
@@ -64,7 +69,7 @@ class Envelope:
     def plate(self, sub_plate: Axis | None) -> Box:
         """Return the plate of the linkage, with a sub-plate if there is one."""
         (x, y), seat = self.lidar.half_mm, -self.lidar.optical_height_mm
-        lower = seat - (0.0 if sub_plate is None else sub_plate_mm(self.lidar)) - PLATE_THICKNESS
+        lower = seat - (0.0 if sub_plate is None else sub_plate_mm(self.lidar)) - plate_mm(self.lidar, sub_plate)
         return (-x, -y, lower), (x, y, seat)
 
     def under(self, sub_plate: Axis | None) -> Box:
@@ -113,6 +118,34 @@ def sub_plate_of(lidar: Lidar, stack: Hub) -> Axis | None:
         return "x" if "+y" in lidar.sides else "y"
     leaning = np.abs(stack.R()[2])
     return None if not covered_screws(lidar, stack) else "x" if leaning[0] <= leaning[1] else "y"
+
+
+def load_share(lidar: Lidar) -> float:
+    """Return the mass of a lidar as a share of HEAVY_G, at most 1.
+
+    A beam under a load keeps its natural frequency if its stiffness is proportional to the mass: the thickness of a
+    plate to the cube root of it, the diameter of a rod to the fourth root.
+    """
+    return min(1.0, lidar.mass_g / HEAVY_G)
+
+
+def plate_mm(lidar: Lidar, sub_plate: Axis | None) -> float:
+    """Return the thickness of the linkage's plate: by the load, and for screws of a standard length."""
+    least, full = PLATE_MM
+    thin = max(least, UNDER_SUB_PLATE if sub_plate else 0.0, full * math.cbrt(load_share(lidar)))
+    sizes = np.arange(PLATE_STEP * math.ceil(thin / PLATE_STEP - 1e-9), full + PLATE_STEP / 2, PLATE_STEP).tolist()
+    if sub_plate is not None or lidar.sides or fixing_of(lidar.base) == "nut":
+        return float(sizes[0])
+    screw, depth = SCREWS[lidar.base.screw], lidar_thread_mm(lidar)
+    engaged = [shank_mm(screw, size, "thread", depth) - size for size in sizes]
+    return float(next(size for size, thread in zip(sizes, engaged, strict=True) if thread >= engaged[-1] - 1e-9))
+
+
+def hub_wall_mm(lidar: Lidar, shaft_diameter: float) -> float:
+    """Return the thickness of the hub around a turned shaft, by the load."""
+    full = shaft_diameter / 2 + HUB_WALL
+    wall = full * load_share(lidar) ** 0.25 - shaft_diameter / 2
+    return float(np.clip(PLATE_STEP * math.ceil(wall / PLATE_STEP - 1e-9), HUB_WALL_MIN, HUB_WALL))
 
 
 def sub_plate_mm(lidar: Lidar) -> float:
@@ -224,7 +257,7 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     """Return whether a driver misses hub and journal, or passes through the hub's rim only."""
     R, driver = stack.R(), SCREWS[lidar.base.screw].driver_radius
     depth = np.linspace(0.0, 150.0, 601)
-    line = np.array([*hole, -lidar.optical_height_mm - PLATE_THICKNESS]) @ R.T - depth[:, None] * R[:, 2]
+    line = np.array([*hole, -lidar.optical_height_mm - plate_mm(lidar, None)]) @ R.T - depth[:, None] * R[:, 2]
     reach = np.hypot(line[:, 0], line[:, 1]) - driver
     hub = (line[:, 2] > stack.shoulder - driver) & (line[:, 2] < driver - stack.h)
     journal = (line[:, 2] > stack.hub_bottom - driver) & (line[:, 2] < stack.hub_bottom + stack.journal)
@@ -298,18 +331,26 @@ def exact(R: Array) -> Array:
 
 
 def hub_height(
-    envelope: Envelope, R: Array, hub_radius: float, ring_radius: float, sub_plate: Axis | None = None
+    envelope: Envelope,
+    R: Array,
+    hub_radius: float,
+    rims: Sequence[tuple[float, float]] = (),
+    sub_plate: Axis | None = None,
+    cross: CrossScrew = CROSS_M3,
 ) -> float:
-    """Return h, rounded up to 0.25 mm: the hub's top is at z = -h."""
+    """Return h, rounded up to 0.25 mm: the hub's top is at z = -h.
+
+    `rims` are radius and depth below the hub's top of round bodies that hide beams anyway: ring, seat of a bearing.
+    """
     lowest = [float((box_corners(box) @ R[2]).min()) for box in (envelope.body, *envelope.cables)]
     plate = float((box_corners(envelope.plate(sub_plate)) @ R[2]).min())
     heads = float((box_corners(envelope.under(sub_plate)) @ R[2]).min())
     heights = [1.0 - z for z in lowest]
-    heights.append(1.0 - heads - HUB_HEIGHT)
-    heights.append(1.0 - plate - (HUB_HEIGHT - CROSS_ABOVE_BOTTOM - 3.0))  # a driver reaches the cross screws
-    if ring_radius > hub_radius:
-        # the hub stays inside the cone that the ring hides anyway
-        heights.append(hub_radius * (HUB_HEIGHT + HUB_GAP) / (ring_radius - hub_radius))
+    heights.append(1.0 - heads - cross.hub_height)
+    heights.append(1.0 - plate - (cross.hub_height - cross.above_bottom - 3.0))  # a driver reaches the cross screws
+    # the hub stays inside one of their cones
+    cones = [hub_radius * depth / (radius - hub_radius) for radius, depth in rims if radius > hub_radius]
+    heights.append(min(cones, default=0.0))
     tilt = math.degrees(math.acos(min(1.0, R[2, 2])))
     low, high = H_FLOOR
     heights.append(low + (high - low) * min(1.0, max(0.0, (tilt - 45.0) / 15.0)))

@@ -10,23 +10,60 @@ from typing import Literal
 
 import numpy as np
 
+from scanwright.cad.screws import SCREWS, Screw
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Bearing
 
-HUB_HEIGHT = 14.0
 HUB_WALL = 12.0  # around the spigot: between the heads of the cross screws and the shaft
-CUP_HUB_WALL = 6.0  # likewise around a cup, which is wide enough to hold it stiffly
+HUB_ROOF = 3.0  # of the hub over the shaft
 NECK_ON_RIM = 1.5  # between the neck and the edge of a cup's rim
+HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
 HUB_GAP = 10.0  # least height between a ring and the hub
 BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
-SPIGOT = 11.0  # length of the shaft inside the hub
-CROSS_ABOVE_BOTTOM = 6.25  # of the cross screws, from the hub's lower face: a wall below their washers
+WASHER_GAP = 0.2  # around a washer
+WASHER_WALL = 1.55  # of the hub below the washers of its cross screws
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_WALL = 2.2  # of the sleeve between bore and leads
 LEANING = 1.15  # width of a lead across the axis, over its diameter, at its bend outwards
 JOURNAL_END = 1.0  # of the sleeve below the bearing
 
 Axis = Literal["x", "y"]
+
+
+@dataclass(frozen=True, slots=True)
+class CrossScrew:
+    """Screw through the hub into the shaft, with a washer: on plastic the pressure limits the friction. mm."""
+
+    screw: Screw
+    washer: float  # diameter
+    washer_thick: float
+    cup_wall: float  # of the hub around a cup, which is wide enough to hold it stiffly
+    sunk: float  # depth of the washer's seat in that wall
+    before_nut: float  # wall of a cup between the hub and a nut
+
+    @property
+    def path(self) -> float:
+        """Radius of the path of washer, head and driver."""
+        return self.washer / 2 + WASHER_GAP
+
+    @property
+    def above_bottom(self) -> float:
+        """Height of the screw over the hub's lower face."""
+        return self.path + WASHER_WALL
+
+    @property
+    def spigot(self) -> float:
+        """Length of the shaft inside the hub."""
+        return self.above_bottom + self.path + 0.05
+
+    @property
+    def hub_height(self) -> float:
+        """Height of the hub."""
+        return self.spigot + HUB_ROOF
+
+
+CROSS_M3 = CrossScrew(SCREWS["M3"], 9.0, 0.8, 6.0, 2.8, 3.0)  # ISO 7093; sunk so that two screws do not meet
+CROSS_SCREWS = (CrossScrew(SCREWS["M2.5"], 6.0, 0.5, 4.5, 2.0, 2.0), CROSS_M3)  # ISO 7089; the smallest first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +79,8 @@ class Hub(ABC):
     ring_length: float
     ring_radius: float
     shaft_diameter: float
+    cross_screw: CrossScrew = CROSS_M3
+    hub_wall: float = HUB_WALL  # around the shaft
     bearing: Bearing | None  # on a sleeve of the shaft, below the hub
     sub_plate: Axis | None  # of the laser frame, along which its ears stick out
     lead_count: int = 0  # bundles of leads from the ring to the lidar
@@ -52,7 +91,8 @@ class Hub(ABC):
     @property
     def hub_radius(self) -> float:
         """Radius of the linkage's hub."""
-        return self.shaft_diameter / 2 + (CUP_HUB_WALL if self.cup_bore > 0 else HUB_WALL)
+        on_sleeve = 0.0 if self.bearing is None else self.bearing.bore_mm / 2 + HUB_STEP
+        return max(self.shaft_diameter / 2 + self.hub_wall, on_sleeve)
 
     @property
     def neck_radius(self) -> float:
@@ -62,7 +102,7 @@ class Hub(ABC):
     @property
     def shoulder(self) -> float:
         """Height of the hub's lower face: above it all turns, below it only sleeve and shaft."""
-        return -self.h - HUB_HEIGHT
+        return -self.h - self.cross_screw.hub_height
 
     @property
     def journal(self) -> float:
@@ -97,12 +137,12 @@ class Hub(ABC):
     @property
     def cross(self) -> float:
         """Height of the screws that cross from the hub into the shaft."""
-        return self.shoulder + CROSS_ABOVE_BOTTOM
+        return self.shoulder + self.cross_screw.above_bottom
 
     @property
     def spigot_top(self) -> float:
         """Height of the shaft's upper end, which is the floor of the hub's bore."""
-        return self.shoulder + SPIGOT
+        return self.shoulder + self.cross_screw.spigot
 
     @property
     def bearing_top(self) -> float:

@@ -18,7 +18,7 @@ from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.drive import Mounted
-from scanwright.cad.layout.hub import SPIGOT, Hub
+from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.statics import elastic
 from scanwright.cad.statics.elastic import Grid, filled
@@ -111,7 +111,7 @@ def _grid(triangles: Array, edge: float, seat: float) -> Grid:
 
 def _spigot(stack: Hub) -> tuple[Array, float]:
     """Return points all around the shaft in the hub, rotation frame, and the area."""
-    radius, length = stack.shaft_diameter / 2, SPIGOT
+    radius, length = stack.shaft_diameter / 2, stack.cross_screw.spigot
     rows, around = max(4, round(length / STEP)), max(12, round(2 * np.pi * radius / STEP))
     z = stack.shoulder + (np.arange(rows) + 0.5) / rows * length
     angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, z)

@@ -6,16 +6,14 @@ import numpy as np
 
 from scanwright.cad.assembly.assembly import LIDAR_CENTRE_ERROR_MM, Assembly
 from scanwright.cad.checks.loads.retention import hanging_on, material_of, together_of
-from scanwright.cad.checks.table import HELD_G, LEAST_MARGIN, at_least, figures
+from scanwright.cad.checks.table import at_least, figures
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import friction_nm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, cross_seat_mm
-from scanwright.cad.layout.tightening import hold_of
+from scanwright.cad.layout.tightening import FRICTION, HELD_G, LEAST_MARGIN, hold_of
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
-
-FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of measured values
 
 
 def angle_checks(assembly: Assembly) -> list[Finding]:

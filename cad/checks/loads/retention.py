@@ -1,9 +1,11 @@
 """Strength of every joint between lidar and deck. SI units.
 
 Each joint is removed in turn: the bodies that then have no path to the deck load it with SHOCK_G times their weight, in
-the worst direction for each screw; friction and preload are neglected. Screws share a force equally and carry a moment
-as a group of equal springs; radial screws of a hub or a boss carry no moment, their fit does; a single screw keeps a
-foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN is a warning.
+the worst direction for each screw; friction and preload are neglected. The bearing of a cage takes a share of the
+rotor's load across the axis off the joints of shaft and servo, and loads those of the cage with it. Screws share a
+force equally and carry a moment as a group of equal springs; radial screws of a hub or a boss carry no moment, their
+fit does; a single screw keeps a foot from tipping over its edge. A joint that yields fails; a margin below LEAST_MARGIN
+is a warning.
 """
 
 from collections.abc import Iterator
@@ -12,12 +14,33 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly, lidar_body
-from scanwright.cad.checks.table import LEAST_MARGIN, SHOCK_G, at_least, tidy
+from scanwright.cad.checks.table import SHOCK_G, at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
+from scanwright.cad.layout.direct.cage import BearingCage, share_weight
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.names import DECK, LIDAR, LIDAR_BODY, SERVO_CASE, SERVO_HORN, SERVO_OUTPUT, TRIPOD
-from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, STEEL, Hold, Material, hold_of
+from scanwright.cad.layout.loads import Weight
+from scanwright.cad.layout.names import (
+    BEARING_CAGE,
+    DECK,
+    LIDAR,
+    LIDAR_BODY,
+    SERVO_CASE,
+    SERVO_HORN,
+    SERVO_OUTPUT,
+    TRIPOD,
+)
+from scanwright.cad.layout.tightening import (
+    ALUMINIUM,
+    BOUGHT,
+    LEAST_MARGIN,
+    MOULDED,
+    PRINTED,
+    STEEL,
+    Hold,
+    Material,
+    hold_of,
+)
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2, cross_matrix
@@ -81,7 +104,11 @@ def _of_joint(assembly: Assembly, joint: Joint) -> Iterator[Finding]:
 def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str]) -> Finding:
     body = together_of(assembly, hanging)
     force = SHOCK_G * STANDARD_GRAVITY_M_S2 * body.mass_kg
-    pull, push = worst_shares(joint, body.centre_m)
+    shaft, cage, brace = assembly.layout.drive.shaft, assembly.layout.drive.of(BearingCage), None
+    if cage is not None and (shaft in hanging) != (BEARING_CAGE in hanging):
+        at, carried_kg = _borne(assembly, cage)
+        brace = at, (-carried_kg if shaft in hanging else carried_kg) / body.mass_kg
+    pull, push = worst_shares(joint, body.centre_m, brace)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
     first = min(margins, key=margins.__getitem__)
     nut = {"trap": " and nuts in it", "nut": " and nuts", "deck": " and nuts"}.get(joint.fixing, "")
@@ -115,24 +142,42 @@ def together_of(assembly: Assembly, names: frozenset[str]) -> Inertial:
     return inertia.together(bodies)
 
 
-def worst_shares(joint: Joint, centre_m: Array) -> tuple[float, float]:
-    """Return the largest pull along and push across one screw by 1 N at a point, shape (3,), in any direction."""
+def _borne(assembly: Assembly, cage: BearingCage) -> tuple[Array, float]:
+    """Return the middle of the bearing [m], shape (3,), and the mass [kg] that it carries across the axis."""
+    stack = cage.stack
+    horn = next(each for each in assembly.layout.joints if (each.part, each.onto) == (stack.shaft, SERVO_HORN))
+    rotor = together_of(assembly, hanging_on(assembly, horn))
+    across = Weight(rotor.mass_kg, 0.0, float(rotor.centre_m[2]) - stack.horn / 1000, 0.0)
+    carried = share_weight(assembly.layout.scanner, stack, cage, across).bearing_force_n
+    return np.array([0.0, 0.0, stack.bearing_middle / 1000]), carried
+
+
+def worst_shares(joint: Joint, centre_m: Array, brace: tuple[Array, float] | None = None) -> tuple[float, float]:
+    """Return the largest pull along and push across one screw by 1 N at a point, shape (3,), in any direction.
+
+    `brace` is another point, at which a share of the newton's part across the axis acts in addition.
+    """
     start = np.array([axis.start for axis in joint.axes]) / 1000
     along = np.array([axis.along for axis in joint.axes])
-    shares = np.broadcast_to(np.eye(3) / joint.count, (joint.count, 3, 3)).copy()
+    middle = start.mean(axis=0)
+    force, moment = np.eye(3), cross_matrix(centre_m - middle)
+    if brace is not None:
+        more = brace[1] * np.diag([1.0, 1.0, 0.0])
+        force, moment = force + more, moment + cross_matrix(brace[0] - middle) @ more
+    shares = np.broadcast_to(force / joint.count, (joint.count, 3, 3)).copy()
     if joint.heel_mm is not None and joint.count == 1:
         arm, heel = centre_m - start[0], joint.heel_mm / 1000
         aside = float(np.linalg.norm(arm - (arm @ along[0]) * along[0]))
         return float(np.hypot(1 + aside / heel, arm @ along[0] / heel)), 1.0
     if abs(along[0, 2]) > AXIAL_COS or not _radial(joint):
-        arms = start - start.mean(axis=0)
+        arms = start - middle
         stiffness = sum((arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in arms), np.zeros((3, 3)))
-        turned = np.linalg.pinv(stiffness, rcond=1e-9) @ cross_matrix(centre_m - start.mean(axis=0))
+        turned = np.linalg.pinv(stiffness, rcond=1e-9) @ moment
         shares += np.array([-cross_matrix(arm) @ turned for arm in arms])
     pulls = np.linalg.norm(np.einsum("ni,nij->nj", along, shares), axis=1)
     if joint.heel_mm is not None:  # a pair: the edge and both screws carry the moment about its line
-        line, arm = start[1] - start[0], centre_m - start.mean(axis=0)
-        turning = np.cross(line / np.linalg.norm(line), arm)
+        line = start[1] - start[0]
+        turning = line / np.linalg.norm(line) @ moment
         pulls = pulls + float(np.linalg.norm(turning)) / (2 * joint.heel_mm / 1000)
     across = shares - np.einsum("ni,nj,njk->nik", along, along, shares)
     return float(pulls.max()), float(np.linalg.norm(across, ord=2, axis=(1, 2)).max())

@@ -47,7 +47,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
     belt = _belt(scanner, ring)
     hub = SPIGOT_DIAMETER / 2 + HUB_WALL
     alone = BeltStack(
-        h=hub_height(envelope, R, hub, 0.0),
+        h=hub_height(envelope, R, hub),
         R_rot_laser=rows_of(R),
         ring_length=ring.length_mm,
         ring_radius=ring.outer_diameter_mm / 2,
@@ -82,7 +82,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
         )
     stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
     if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
-        stack = replace(stack, h=hub_height(envelope, R, hub, 0.0, axis), sub_plate=axis)
+        stack = replace(stack, h=hub_height(envelope, R, hub, sub_plate=axis), sub_plate=axis)
     return replace(stack, quarter=_quarter(scanner, stack, envelope.radius(stack.sub_plate)))
 
 

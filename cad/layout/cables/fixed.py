@@ -15,7 +15,7 @@ import numpy as np
 from scanwright.cad.layout.cables.leads import SAMPLE, mass_g
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
 from scanwright.cad.layout.cables.route import Ending, Path, short_path
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.drive import Mounted, Rod
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import triple
@@ -146,7 +146,7 @@ def _on_foot(deck: Deck, half: float, lane: int) -> list[Ending]:
     ends = []
     for seat in deck.ties:
         aside = (2 * lane - 1) * (seat.half - half - FROM_SLOT)
-        z = np.array([FOOT_THICKNESS + half + ON_FOOT])
+        z = np.array([deck.foot_mm + half + ON_FOOT])
         (end,) = seat.points(np.array([seat.end + BEYOND]), np.array([aside]), z) @ deck.rotation().T + np.array(
             deck.centre
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
 from scanwright.cad.layout.cables.route import GAP, CableSpace, Ending, Path, PathPiece, lattice_about_axis, short_path
-from scanwright.cad.layout.deck import FOOT_THICKNESS, Deck
+from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Bundle
 from scanwright.cad.layout.envelope import Box, around_axis, box_corners
@@ -131,7 +131,7 @@ class RotorSpace:
         """Return whether points are over the foot of the mount in every position of the turn."""
         normal = np.array(self.deck.normal)
         lowest = points[:, 2] * normal[2] - np.hypot(points[:, 0], points[:, 1]) * math.hypot(normal[0], normal[1])
-        return np.asarray(lowest - np.array(self.deck.centre) @ normal > FOOT_THICKNESS + apart)
+        return np.asarray(lowest - np.array(self.deck.centre) @ normal > self.deck.foot_mm + apart)
 
     def _in_fan(self, points: Array, half: float) -> Mask:
         """Return whether a lead at points would meet a beam; both turn together."""

@@ -178,7 +178,7 @@ def _mounted(servo: Servo, stack: DirectStack, frame: ServoFrame | None) -> Moun
             holes=frame.feet,
             fixing="nut",
             corners=np.array([(sign * x, y, height) for sign in (-1, 1) for y in frame.ends_y for height in z]),
-            bodies=(*bodies, *map(box_corners, frame.boxes())),
+            bodies=(*bodies, box_corners(frame.sides()), frame.feet_corners(*frame.ends_y)),
             discs=discs,
             on_flat_deck=True,
             thread_mm=FOOT,

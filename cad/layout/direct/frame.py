@@ -9,12 +9,15 @@ the servo and its torque only; the sides hold the case against that torque as we
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import Box
 from scanwright.cad.layout.joints import fixing_in
 from scanwright.cad.layout.names import SERVO_FRAME
 from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
+from scanwright.design.arrays import Array
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
@@ -23,7 +26,7 @@ GRIP = 2.5  # of the plate, under the heads of the servo's screws
 HORN_GAP = 0.5  # around the turning parts in the plate's opening
 OVER_HEADS = 0.5  # between the heads and the parts that turn above them
 GAP = 0.3  # around the case
-LEG = 5.0
+LEG = 3.6  # stiff for all that a horn carries without a bearing: four hold it sideways with 0.5 N/um
 EAR_LEG = 10.0  # with screws in its upper end: a nut M3 in a slot, and walls
 EAR_SCREW = SCREWS["M3"]
 EAR_DEPTH = 8.0  # of their holes
@@ -33,8 +36,9 @@ WINDOW = 8.0  # half width of the opening between two legs, about the servo's pl
 LEAST_LEG = 8.0
 LEAST_BRIDGE = 3.0  # of the plate beyond its opening
 HEADER = 8.0  # of a side above its window
-FOOT = 6.0
-FOOT_REACH = 10.0
+FOOT = 4.0
+FOOT_REACH = 9.0
+NUT_PLAY = 0.4  # across the flats of a nut in its slot, which keeps it from turning
 FOOT_SCREW = SCREWS["M3"]
 SEAT_GAP = 0.3  # the feet carry, not the case
 
@@ -72,13 +76,19 @@ class ServoFrame:
         y = sum(y for _, y in self.holes) / len(self.holes)
         return min(abs(end - y) for end in self.ends_y)
 
-    def boxes(self) -> tuple[Box, Box]:
-        """Return the boxes around its sides with the plate, and around its feet."""
-        (y0, y1), side, low = self.ends_y, self.half_x + self.leg, self.low
-        return (
-            ((-side, y0, low), (side, y1, self.high)),
-            ((-self.reach_x, y0, low), (self.reach_x, y1, low + FOOT)),
-        )
+    def sides(self) -> Box:
+        """Return the box around its sides with the plate."""
+        side = self.half_x + self.leg
+        return (-side, self.ends_y[0], self.low), (side, self.ends_y[1], self.high)
+
+    def feet_corners(self, start: float, end: float) -> Array:
+        """Return the corners of both feet between two y, shape (12, 3): they slope, so that they print without support.
+
+        The frame is printed on its plate.
+        """
+        side, low = self.half_x + self.leg, self.low
+        outline = (self.reach_x, low), (self.reach_x, low + FOOT), (side, low + FOOT + FOOT_REACH)
+        return np.array([(sign * x, y, z) for sign in (-1.0, 1.0) for y in (start, end) for x, z in outline])
 
     def legs(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
         """Return the boxes of the four legs with their feet, as low and high corners."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.direct.stack import DirectStack
+from scanwright.cad.layout.direct.stack import CAGE_SEAT_WALL, DirectStack
 from scanwright.cad.layout.envelope import sub_plate_cm3
 from scanwright.cad.layout.hub import BUNDLE_GAP, JOURNAL_WALL
 from scanwright.cad.layout.loads import (
@@ -32,7 +32,6 @@ from scanwright.design.scanner import Scanner
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
 LINKAGE_OFF_AXIS_MM = 20.0
 LEADS_DEPTH = 6.0  # least depth of the channel for the ring's leads
-HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
 SHEAR_SHARE = 0.9  # of a round section that carries shear
 
 
@@ -67,21 +66,22 @@ class Supported:
 
 
 def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
-    """Return the smallest bearing around shaft and leads and under the hub; None without a ring if there is none.
+    """Return the smallest bearing around shaft and leads and in the cage; None without a ring if there is none.
 
     Raises:
         BuildError: the leads of the ring need more space than any bearing leaves.
     """
     depth = max(LEADS_DEPTH, stack.lead_diameter + 2 * BUNDLE_GAP)
     least = stack.shaft_diameter + 2 * JOURNAL_WALL + (0.0 if scanner.slip_ring is None else 2 * depth)
-    most = 2 * (stack.hub_radius - HUB_STEP)
-    fit = next((bearing for bearing in scanner.bearings if least <= bearing.bore_mm <= most), None)
+    most = 2 * (stack.cage_outer - CAGE_SEAT_WALL)
+    fit = next((one for one in scanner.bearings if least <= one.bore_mm and one.outer_mm < most), None)
     ring = scanner.slip_ring
     if fit is None and ring is not None and scanner.bearings:
         raise BuildError(
             f"{BEARING_CAGE}: slip_ring {ring.name}: lead_diameter_mm = {ring.lead_diameter_mm}"
             f"{ring.caution('lead_diameter_mm')}: the axis needs a bearing around shaft and leads with a bore of "
-            f"{least:.1f} to {most:.1f} mm, and the catalogue has none; take a ring with fewer circuits"
+            f"{least:.1f} mm that is less than {most:.1f} mm wide, and the catalogue has none; take a ring with fewer "
+            "circuits"
         )
     return fit
 

@@ -10,8 +10,8 @@ from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
 from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
-from scanwright.cad.layout.envelope import Envelope, hub_height, lidar_pose, rows_of, sub_plate_of
-from scanwright.cad.layout.hub import HUB_WALL
+from scanwright.cad.layout.envelope import Envelope, hub_height, hub_wall_mm, lidar_pose, rows_of, sub_plate_of
+from scanwright.cad.layout.hub import CROSS_M3, HUB_GAP, HUB_WALL
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -37,7 +37,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
     R = lidar_pose(scanner)
     stack = _without_sub_plate(scanner, envelope, R)
     if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
-        h = hub_height(envelope, R, stack.hub_radius, stack.ring_radius, axis)
+        h = hub_height(envelope, R, stack.hub_radius, stack.rims, axis, stack.cross_screw)
         stack = replace(stack, h=h, sub_plate=axis)
     if stack.bearing is None:
         return stack, None
@@ -53,8 +53,9 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     ring, count = scanner.slip_ring, max(1, len(scanner.lidar.cable_y_mm))
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
+    wall = hub_wall_mm(scanner.lidar, shaft)
     alone = DirectStack(
-        h=hub_height(envelope, R, shaft / 2 + HUB_WALL, radius),
+        h=hub_height(envelope, R, shaft / 2 + wall, [(radius, CROSS_M3.hub_height + HUB_GAP)]),
         R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,
@@ -64,6 +65,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         lead_diameter=0.0 if ring is None else ring.leads_mm(count),
         lead_radius=0.0 if ring is None else ring.lead_bend_radius_mm or 0.0,
         shaft_diameter=shaft,
+        hub_wall=wall,
         flange_radius=flange_radius,
         flange_thickness=flange_thickness,
         collar_radius=collar_radius,
@@ -77,12 +79,17 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     forked = needs_frame(scanner.servo) or bool(fork_holes(scanner.servo, alone))
     # the horn is not rated for the rotor, or only the base of a cage has holes for the adapter of a ring
     if not horn_bears(scanner, alone) or (ring is not None and not forked):
+        h = hub_height(envelope, R, shaft / 2 + HUB_WALL, alone.rims)
+        alone = replace(alone, h=h, hub_wall=HUB_WALL)  # wider than the bore of a bearing
         try:
             bearing = bearing_for(scanner, alone)
         except BuildError:
             ears_of(scanner, alone)  # its error comes first: no other ring corrects it
             raise
-    return cup if cup is not None and bearing is None else replace(alone, bearing=bearing)
+    if bearing is None:
+        return cup or alone
+    stack = replace(alone, bearing=bearing)
+    return replace(stack, h=hub_height(envelope, R, stack.hub_radius, stack.rims))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

@@ -6,7 +6,7 @@ ring's top, all fixed parts around the shaft stay below it: clearance over a tur
 
     z = 0             optical centre
     -h                top of the linkage's hub
-    shoulder          HUB_HEIGHT below: all that turns and is wider than the journal is above it
+    shoulder          the height of the hub below: all that turns and is wider than the journal is above it
     hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
     leads_low         HUB_GAP, or the height of the bend of its leads, below: the end of the ring's rotor collar
     ring_top          the collar's length below
@@ -120,6 +120,14 @@ class DirectStack(Hub):
         if self.bearing is None:
             return self.cage_seat
         return self.cage_seat - CAGE_LIP - (self.cage_inner - self.bearing.outer_mm / 2 + CAGE_LIP)
+
+    @property
+    def rims(self) -> list[tuple[float, float]]:
+        """Radius and depth below the hub's top of the ring, or of seat and wall of the cage around it."""
+        if self.bearing is None:
+            return [(self.ring_radius, self.cross_screw.hub_height + HUB_GAP)]
+        seat = self.bearing.outer_mm / 2 + CAGE_SEAT_WALL
+        return [(seat, -self.cage_top - self.h), (self.cage_outer, -self.cage_roof - self.h)]
 
     @property
     def leads_low(self) -> float:

@@ -14,14 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scanwright.cad.layout.deck import FOOT_THICKNESS, FREE, Deck
+from scanwright.cad.layout.deck import FREE, Deck
 from scanwright.cad.layout.drive import DriveLayout
-from scanwright.cad.layout.hub import CROSS_ABOVE_BOTTOM
 from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
-from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, AlignmentLinkage, Ear
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -51,7 +50,7 @@ SECTIONS = (
 )
 SCREW = SCREWS["M4"]
 UPRIGHT = 1e-6  # sine of the tilt
-EAR_ABOVE_SHOULDER = CROSS_ABOVE_BOTTOM + CROSS_RADIUS + 0.5  # clear of the cross screws
+EAR_ABOVE_CROSS = 0.5  # of the paths of the cross screws
 EAR_BELOW_TOP = 0.5  # of the hub
 FROM_HUB = 1.0
 TRIM = 5.0  # travel of the bar in either direction: a lidar's centre of mass is undocumented
@@ -154,7 +153,7 @@ def _bar(scanner: Scanner, linkage: AlignmentLinkage, azimuth: float, section: t
         azimuth=azimuth,
         half_width=max(section[0] / 2, SCREW.driver_radius + TRIM / 2),
         end=start + SCREWS_AT[-1] + TRIM + SCREW.driver_radius,
-        low=stack.shoulder + EAR_ABOVE_SHOULDER,
+        low=stack.cross + stack.cross_screw.path + EAR_ABOVE_CROSS,
         high=-stack.h - EAR_BELOW_TOP,
         slots=tuple((start + at - TRIM, start + at + TRIM) for at in SCREWS_AT),
         slot_width=SCREW.nominal + scanner.printer.screw_clearance_mm,
@@ -180,7 +179,7 @@ class _FreeSpace:
         if math.hypot(bar.end, half) > self.drive.envelope.radius(stack.sub_plate):
             return "would extend beyond the lidar"
         rims = ((math.hypot(outer, half), ear.high), (math.hypot(ear.end, ear.half_width), ear.low - SCREW.head_height))
-        if _height_over(self.deck, rims) < FOOT_THICKNESS + FREE / 2:
+        if _height_over(self.deck, rims) < self.deck.foot_mm + FREE / 2:
             return "would be too near to the deck"
         if not self.drive.bears(bar.mass_g, bar.ear.high + bar.section[1] / 2):
             return f"would be too heavy for the horn of {scanner.servo.name} alone"

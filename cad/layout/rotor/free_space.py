@@ -8,7 +8,7 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from scanwright.cad.layout.envelope import PLATE_THICKNESS, Box, slot_ends
+from scanwright.cad.layout.envelope import Box, slot_ends
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.design.arrays import Array, Mask
 
@@ -37,7 +37,7 @@ def in_fan(points: Array, p: AlignmentLinkage, gap: float, fan_z: tuple[float, f
 
 def behind_screws(points: Array, p: AlignmentLinkage) -> Mask:
     """Return points on the paths of drivers of the lidar's screws; none with a sub-plate."""
-    below = points[:, 2] < p.top - PLATE_THICKNESS
+    below = points[:, 2] < p.top - p.plate
     if p.ears is not None:
         return np.zeros_like(below)
     return below & at_screws(points, p)

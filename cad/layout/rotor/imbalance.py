@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.loads import noise_deg, tilt_sine
 from scanwright.cad.layout.rotor.free_space import at_screws, behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
@@ -24,7 +23,7 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage, neck: Array) -> Arra
     lidar, stack, R = scanner.lidar, p.stack, p.stack.R()
     reach = max(p.half_x, p.half_y) if p.ears is None else max(p.ears[1][:2])
     plate = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0.0, 1.0)])
-    plate = plate * [reach, reach, p.seat - p.top + PLATE_THICKNESS] + [0.0, 0.0, p.top - PLATE_THICKNESS]
+    plate = plate * [reach, reach, p.seat - p.top + p.plate] + [0.0, 0.0, p.top - p.plate]
     r = stack.hub_radius
     corners = np.concatenate([neck, plate @ R.T, [[-r, -r, stack.shoulder], [r, r, -stack.h]]])
     axes = [np.arange(low + CELL / 2, high, CELL) for low, high in zip(corners.min(0), corners.max(0), strict=True)]
@@ -34,7 +33,7 @@ def estimated_moment(scanner: Scanner, p: AlignmentLinkage, neck: Array) -> Arra
     on_plate = (x < p.half_x) & (y < p.half_y) & (x + y < p.half_x + p.half_y - p.chamfer)
     if p.ears is not None:
         on_plate |= (x < p.ears[1][0]) & (y < p.ears[1][1])
-    solid = (on_plate & (z > p.top - PLATE_THICKNESS) & (z < p.top)) | in_hull(cells, neck, 0.0)
+    solid = (on_plate & (z > p.top - p.plate) & (z < p.top)) | in_hull(cells, neck, 0.0)
     around = np.hypot(cells[:, 0], cells[:, 1])
     free = np.any([in_box(in_laser, swept(box), 0.0) for box in (p.body, *p.cables)], axis=0)
     solid &= ~in_fan(in_laser, p, 0.0) & ~behind_screws(in_laser, p)

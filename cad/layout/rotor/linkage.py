@@ -9,12 +9,13 @@ from scanwright.cad import outlines
 from scanwright.cad.layout.envelope import (
     BODY_GAP,
     EAR_SCREW,
-    PLATE_THICKNESS,
     Box,
     Envelope,
     SideWall,
     box_corners,
     ear_screws,
+    load_share,
+    plate_mm,
     screw_travel_mm,
     side_walls,
     slot_ends,
@@ -27,16 +28,14 @@ from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.holes import what_holds
+from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-CROSS_SCREW = SCREWS["M3"]  # through the hub into the shaft
-CROSS_WASHER_MM, CROSS_WASHER_THICK = 9.0, 0.8  # ISO 7093: a wide one, the pressure on plastic limits the friction
-CROSS_RADIUS = CROSS_WASHER_MM / 2 + 0.2  # radius of the path of washer, head and driver
-CROSS_SUNK = 2.8  # of its head into the hub: the screw then ends just before the other one
 CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
-BEFORE_NUT = 3.0  # wall of a cup between the hub and the nut of a cross screw
+CHAMFER = 4.0  # of the plate's corners, without lugs
+NECK_SHARE = 0.6  # least of the neck's width at the plate: the plate extends beyond it
 HEEL = 8.0  # of the neck below a lying plate
 BACK = 6.0  # of the neck behind its lower half: a bracket, thick at its foot
 RING_MARGIN = 0.03  # rad, between the sector of a full fan and the sector that the ring hides
@@ -63,6 +62,8 @@ class AlignmentLinkage:
     stack: Hub
     seat: float  # z of the lidar's base in the laser frame
     top: float  # z of the plate's upper face: the seat, or below a sub-plate
+    plate: float  # thickness of the plate
+    neck_share: float  # width of the neck at the plate, over that of the plate
     half_x: float
     half_y: float
     chamfer: float
@@ -116,12 +117,14 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         )
     # the cut corner leaves the wall that the straight edge leaves
     corner = min((half_x + half_y - abs(x) - abs(y) for x, y in outermost), default=math.inf)
-    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, 4.0)) if holes else 4.0
+    chamfer = float(np.clip(corner - math.sqrt(2) * (edge + hole / 2), 0.5, _free_corner(lidar))) if holes else CHAMFER
     low, high = lidar.window_z_mm
     return AlignmentLinkage(
         stack=stack,
         seat=-lidar.optical_height_mm,
         top=-lidar.optical_height_mm - (0.0 if stack.sub_plate is None else sub_plate_mm(lidar)),
+        plate=plate_mm(lidar, stack.sub_plate),
+        neck_share=_neck_share(lidar, stack),
         half_x=half_x,
         half_y=half_y,
         chamfer=chamfer,
@@ -138,10 +141,22 @@ def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> Alignme
         holes=holes,
         screw_travel=travel,
         fit=printer.fit_clearance_mm,
-        cross_hole=passing_hole(CROSS_SCREW, printer),
+        cross_hole=passing_hole(stack.cross_screw.screw, printer),
         cross_azimuths=_cross_azimuths(stack.R()[:, 2]),
-        cross_thread=thread_in_part(CROSS_SCREW, printer, carries=True) if stack.cup_bore > 0 else None,
+        cross_thread=thread_in_part(stack.cross_screw.screw, printer, carries=True) if stack.cup_bore > 0 else None,
     )
+
+
+def _neck_share(lidar: Lidar, stack: Hub) -> float:
+    """Return the width of the neck at the plate over that of the plate: by the load, in full below a lying plate."""
+    normal, light = stack.R()[:, 2], max(NECK_SHARE, load_share(lidar) ** 0.25)
+    return light + (1 - light) * math.hypot(normal[0], normal[1]) ** 4
+
+
+def _free_corner(lidar: Lidar) -> float:
+    """Return the chamfer of a plate that cuts no more than CHAMFER from the lidar's body itself, without its lugs."""
+    lugs = sum(half - size / 2 for half, size in zip(lidar.half_mm, lidar.body_mm, strict=False))
+    return min(CHAMFER + lugs, max(CHAMFER, min(lidar.half_mm) / 3))
 
 
 def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
@@ -156,8 +171,9 @@ def neck_corners(p: AlignmentLinkage, attempt: int) -> Array:
     under_body = float((box_corners(p.body) @ R[2]).min()) - 0.8
     top = min(max(-stack.h, under_body), 40.0 - stack.h)
     layers = [np.column_stack([ring, np.full(24, z)]) for z in (stack.shoulder + 1.5, top)]
-    outline = outlines.octagon(p.half_x - 0.5, p.half_y - 0.5, p.chamfer)
-    for z in (p.top - 0.2, p.top - PLATE_THICKNESS + 0.5):
+    share = p.neck_share
+    outline = outlines.octagon(share * p.half_x - 0.5, share * p.half_y - 0.5, share * p.chamfer)
+    for z in (p.top - 0.2, p.top - p.plate + 0.5):
         layers.append(np.column_stack([outline, np.full(8, z)]) @ R.T)
     layers.append(_foot(np.concatenate(layers[2:]), stack))
     return np.concatenate(layers)
@@ -220,7 +236,7 @@ def _cross_azimuths(normal: Array) -> tuple[float, ...]:
 
 def cross_seat_mm(stack: Hub) -> float:
     """Return the distance of the cross screws' washers from the axis."""
-    return stack.hub_radius - CROSS_SUNK
+    return stack.hub_radius - stack.cross_screw.sunk
 
 
 def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
@@ -235,5 +251,7 @@ def cross_thread_mm(p: AlignmentLinkage) -> float:
     """Return the thread length of a cross screw in the shaft up to the other one, or in a cup up to its nut."""
     outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
     if thread is None:
-        return outer - CROSS_SCREW.nominal / 2 - CROSSING
-    return BEFORE_NUT if thread.trap is not None else round_wall_mm(p.stack.cup_bore / 2, outer, thread.hole)
+        return outer - p.stack.cross_screw.screw.nominal / 2 - CROSSING
+    if thread.trap is not None:
+        return p.stack.cross_screw.before_nut
+    return round_wall_mm(p.stack.cup_bore / 2, outer, thread.hole)

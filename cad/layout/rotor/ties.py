@@ -10,7 +10,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from scanwright.cad.layout.drive import DriveLayout
-from scanwright.cad.layout.envelope import PLATE_THICKNESS
 from scanwright.cad.layout.names import HUB_TIE, PLATE_TIE
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
@@ -43,7 +42,7 @@ def plate_ties_of(lidar: Lidar, p: AlignmentLinkage, neck: Array) -> tuple[TieSe
             aside=-y,
             inner=p.half_x - 2.0,
             first=p.half_x + FROM_SIDE,
-            low=p.top - PLATE_LOW,
+            low=p.top - min(PLATE_LOW, p.plate),
             high=p.top - BELOW_SEAT,
             half=lidar.cable_diameter_mm / 2 + 0.2,
         )
@@ -106,7 +105,7 @@ def _fits(seat: TieSeat, p: AlignmentLinkage, neck: Array) -> bool:
     both = body if seat.grooved else np.concatenate([body, tie])
     of_laser = both @ p.stack.R()
     boxes = [p.body, *p.cables, *([] if p.ears is None else [p.ears])]
-    plate = (-p.half_x, -p.half_y, p.top - PLATE_THICKNESS), (p.half_x, p.half_y, p.top)
+    plate = (-p.half_x, -p.half_y, p.top - p.plate), (p.half_x, p.half_y, p.top)
     return not (
         any(in_box(of_laser, swept(box), GAP).any() for box in boxes)
         or in_box(of_laser, plate, GAP).any()

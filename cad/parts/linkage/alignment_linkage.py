@@ -20,14 +20,12 @@ import numpy as np
 from scanwright.cad import outlines, solids
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, PLATE_THICKNESS, around_axis, slot_ends
+from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, around_axis, slot_ends
 from scanwright.cad.layout.joints import Joint, fixing_in, inward_axes, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, LIDAR_BODY
 from scanwright.cad.layout.placement import Placement
 from scanwright.cad.layout.rotor.free_space import in_hull
 from scanwright.cad.layout.rotor.linkage import (
-    CROSS_SCREW,
-    CROSS_WASHER_MM,
     AlignmentLinkage,
     cross_floor_mm,
     cross_seat_mm,
@@ -59,12 +57,12 @@ def linkage_spec(place: Placement) -> PartSpec:
         ALIGNMENT_LINKAGE,
         place.drive.shaft,
         "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
-        CROSS_SCREW,
+        place.stack.cross_screw.screw,
         inward_axes(p.cross_azimuths, heads, p.stack.cross),
         grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
         thread_mm=cross_thread_mm(p),
         thread=p.cross_thread,
-        washer_mm=CROSS_WASHER_MM,
+        washer_mm=place.stack.cross_screw.washer,
     )
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
@@ -78,7 +76,7 @@ def linkage_spec(place: Placement) -> PartSpec:
         shapes=shapes,
         angles="laser",
         seat=p.top,
-        joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, PLATE_THICKNESS)])),
+        joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, p.plate)])),
         avoid=tuple(_around(place)),
         steps={LIDAR: _lidar_step(p)},
     )
@@ -190,7 +188,7 @@ def _lidar_space(p: AlignmentLinkage) -> list[cq.Solid]:
 
 def _plate(p: AlignmentLinkage) -> cq.Shape:
     """Return the plate with its tabs, and under a sub-plate its ears."""
-    low = p.top - PLATE_THICKNESS
+    low = p.top - p.plate
     plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
     if p.plate_ties:
         plate = plate.fuse(*(tie_lug(tie) for tie in p.plate_ties))
@@ -204,13 +202,13 @@ def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:
     """Return heads and drivers of the base screws, from the plate's lower face along -z of the laser frame."""
     if p.ears is not None:
         return []
-    low = p.top - PLATE_THICKNESS
+    low = p.top - p.plate
     return _for_screws(p, p.screw.driver_radius + WIDER * attempt, low - DRIVER_LENGTH, low)
 
 
 def _opened(p: AlignmentLinkage, neck: Array) -> list[cq.Shape]:
     """Return cuts outwards from drivers or heads near the surface, which would leave a skin."""
-    low, high = p.top - PLATE_THICKNESS - DRIVER_LENGTH, p.top - PLATE_THICKNESS
+    low, high = p.top - p.plate - DRIVER_LENGTH, p.top - p.plate
     below = high - DRIVER_DEEP
     if p.ears is not None:
         low, high = _pockets(p)
@@ -238,9 +236,9 @@ def _for_screws(p: AlignmentLinkage, radius: float, low: float, high: float) -> 
 def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
     """Return holes of the base screws; under a sub-plate pockets for their heads, and threads for the ears."""
     if p.ears is None:
-        return _for_screws(p, p.screw_hole / 2, p.top - PLATE_THICKNESS - 2.0, p.top + 1.0)
+        return _for_screws(p, p.screw_hole / 2, p.top - p.plate - 2.0, p.top + 1.0)
     pockets = _for_screws(p, p.screw.driver_radius, *_pockets(p))
-    low = p.top - PLATE_THICKNESS - 1.0
+    low = p.top - p.plate - 1.0
     traps = [] if p.ear_thread.trap is None else [_ear_trap(p, p.ear_thread.trap, hole) for hole in p.ear_screws]
     return pockets + traps + [solids.upright(p.ear_thread.hole / 2, low, p.top + 1.0, *hole) for hole in p.ear_screws]
 
@@ -248,14 +246,14 @@ def _holes(p: AlignmentLinkage) -> list[cq.Shape]:
 def _ear_trap(p: AlignmentLinkage, trap: Trap, hole: tuple[float, float]) -> cq.Solid:
     """Return the pocket of a nut in the plate's lower face, its flats towards the ends of the ear."""
     outline = outlines.polygon(trap.corner, 6, 0.0 if p.stack.sub_plate == "x" else math.pi / 2) + hole
-    low = p.top - PLATE_THICKNESS
+    low = p.top - p.plate
     return solids.prism(outline, low - TRAP_LENGTH, low + trap.depth)
 
 
 def _plate_mark(p: AlignmentLinkage, neck: Array) -> cq.Solid:
     """Return FRONT: a V in the edge at +x, half the plate deep, and through the neck there. Laser frame."""
     x = p.half_x if p.stack.sub_plate != "x" else p.half_x + EAR_REACH
-    low, high = p.top - PLATE_THICKNESS / 2, p.top + 1.0
+    low, high = p.top - p.plate / 2, p.top + 1.0
     beyond = np.arange(2.0, MARK_LENGTH, 0.5)
     ends = np.array(list(itertools.product(x + beyond, (-4.0, 0.0, 4.0), (low, high))))
     free = ~in_hull(ends, neck, 0.1).reshape(len(beyond), -1).any(axis=1)

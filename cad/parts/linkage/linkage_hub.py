@@ -10,7 +10,7 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.hub import JOURNAL_WALL
-from scanwright.cad.layout.rotor.linkage import CROSS_RADIUS, CROSS_WASHER_THICK, AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear, cross_seat_mm
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
@@ -24,7 +24,7 @@ def hub(p: AlignmentLinkage) -> cq.Shape:
     stack = p.stack
     hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
     if p.ear is not None:
-        hub = hub.fuse(_ear(p.ear, p.stack.shaft_diameter))
+        hub = hub.fuse(_ear(p.ear, (stack.shaft_diameter / 2 + stack.hub_radius) / 2))
     if p.hub_tie is not None:
         hub = hub.fuse(tie_lug(p.hub_tie))
     return hub
@@ -101,7 +101,8 @@ def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
     stack, cuts = p.stack, []
     for azimuth in p.cross_azimuths:
         cuts.append(solids.radial(p.cross_hole / 2, azimuth, stack.cross))
-        cuts.append(solids.radial(CROSS_RADIUS, azimuth, stack.cross, cross_seat_mm(stack) - CROSS_WASHER_THICK))
+        seat = cross_seat_mm(stack) - stack.cross_screw.washer_thick
+        cuts.append(solids.radial(stack.cross_screw.path, azimuth, stack.cross, seat))
     return cuts
 
 

@@ -14,7 +14,6 @@ from scanwright.cad import outlines, solids
 from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
-    PLATE_THICKNESS,
     cables_of,
     ear_corner,
     ear_screws,
@@ -63,7 +62,7 @@ def sub_plate_spec(place: Placement) -> PartSpec | None:
         EAR_SCREW,
         placed_axes(upright_axes(p.ear_screws, p.seat, -1.0), p.stack.R()),
         grip_mm=sub_plate_mm(scanner.lidar),
-        thread_mm=PLATE_THICKNESS - (0.0 if thread.trap is None else thread.trap.depth),
+        thread_mm=p.plate - (0.0 if thread.trap is None else thread.trap.depth),
         thread=thread,
     )
     why = "the lidar has its threads in its sides" if p.walls else "the hub covers one of the lidar's screws"

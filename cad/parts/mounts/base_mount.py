@@ -16,7 +16,12 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
-from scanwright.cad.layout.deck import BACK_THICKNESS, FOOT_THICKNESS, PAD_HALF, PLUG_GAP, RAIL_INSET, Deck, rail_wall
+from scanwright.cad.layout.deck import (
+    PLUG_GAP,
+    RAIL_INSET,
+    Deck,
+    rail_wall,
+)
 from scanwright.cad.layout.drive import Mounted
 from scanwright.cad.layout.envelope import box_corners
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
@@ -93,14 +98,14 @@ def _joints(place: Placement) -> Iterator[Joint]:
         thread=mounted.thread,
     )
     if deck.tripod is None:
-        axes = placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), deck.rotation(), deck.centre)
-        yield Joint(BASE_MOUNT, DECK, "deck", deck.screw, axes, grip_mm=FOOT_THICKNESS, thread_mm=DECK_MM)
+        axes = placed_axes(upright_axes(deck.deck_holes, deck.foot_mm, -1.0), deck.rotation(), deck.centre)
+        yield Joint(BASE_MOUNT, DECK, "deck", deck.screw, axes, grip_mm=deck.foot_mm, thread_mm=DECK_MM)
 
 
 def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
     """Yield the back plate, rails, strut and foot."""
     (x, y), (_, cy, cz) = deck.back_half, deck.back_centre
-    yield shape_of(box_corners(((-x, cy - y, cz - BACK_THICKNESS), (x, cy + y, cz))))
+    yield shape_of(box_corners(((-x, cy - y, cz - deck.back_mm), (x, cy + y, cz))))
     for side in (1.0, -1.0):
         middle, along = side * abs(mounted.holes[0][0]), y - RAIL_INSET
         low, high = (middle - RAIL_HALF, cy - along, cz), (middle + RAIL_HALF, cy + along, cz + PLUG_GAP)
@@ -109,7 +114,7 @@ def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
     front = np.array([[0.0, 0.0, 1.0, STRUT_BEHIND - cz]])
     yield replace(strut, planes=np.concatenate([strut.planes, front]))
     outline = outlines.octagon(*deck.foot)
-    layers = [np.column_stack([outline, np.full(8, z)]) for z in (0.0, FOOT_THICKNESS)]
+    layers = [np.column_stack([outline, np.full(8, z)]) for z in (0.0, deck.foot_mm)]
     yield shape_of(np.concatenate(layers) @ deck.rotation().T + np.array(deck.centre))
 
 
@@ -121,7 +126,7 @@ def base_mount(place: Placement) -> cq.Solid:
     on_deck = solids.location(deck.rotation(), deck.centre)
     back = deck.back_centre[2]
     with building(BASE_MOUNT, "strut and foot", "deck normal", axis) as checked:
-        foot = solids.prism(outlines.octagon(*deck.foot), 0.0, FOOT_THICKNESS).moved(on_deck)
+        foot = solids.prism(outlines.octagon(*deck.foot), 0.0, deck.foot_mm).moved(on_deck)
         body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
     with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
         rails = [_rail(deck, mounted, printer, side) for side in (1.0, -1.0)]
@@ -133,7 +138,7 @@ def base_mount(place: Placement) -> cq.Solid:
             cuts.append(solids.upright(hole, back - 20.0, mounted.ears + 1.0, x, y))
             cuts.append(solids.upright(driver, back - 400.0, heads, x, y))
         for x, y in deck.deck_holes:
-            cuts.append(solids.upright(deck_hole, -1.0, FOOT_THICKNESS + 1.0, x, y).moved(on_deck))
+            cuts.append(solids.upright(deck_hole, -1.0, deck.foot_mm + 1.0, x, y).moved(on_deck))
         cuts += [cut.moved(on_deck) for seat in deck.ties for cut in tie_slots(seat)]
         return checked(body.cut(*cuts).clean())
 
@@ -141,7 +146,7 @@ def base_mount(place: Placement) -> cq.Solid:
 def _back_plate(deck: Deck) -> cq.Solid:
     x, y = deck.back_half
     _, cy, cz = deck.back_centre
-    return solids.prism(outlines.octagon(x, y, 3.0, cy), cz - BACK_THICKNESS, cz)
+    return solids.prism(outlines.octagon(x, y, 3.0, cy), cz - deck.back_mm, cz)
 
 
 def _strut(deck: Deck) -> cq.Shape:
@@ -155,7 +160,7 @@ def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Sol
     _, cy, cz = deck.back_centre
     y = deck.back_half[1] - RAIL_INSET
     half = max(RAIL_HALF_WIDTH, mounted.screw.driver_radius + rail_wall(printer))
-    low = (x - half, cy - y, cz - BACK_THICKNESS / 2)
+    low = (x - half, cy - y, cz - deck.back_mm / 2)
     return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))
 
 
@@ -167,8 +172,8 @@ def _strut_corners(deck: Deck) -> Array:
     x, y = deck.back_half
     _, cy, cz = deck.back_centre
     plate = outlines.octagon(x - 0.4, y - 0.4, 3.0, cy)
-    pad = outlines.octagon(PAD_HALF, PAD_HALF, 8.0)
-    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - BACK_THICKNESS + 0.7)]
-    for z in (0.8, FOOT_THICKNESS - 0.9):
+    pad = outlines.octagon(deck.pad_half, deck.pad_half, 8.0)
+    layers = [np.column_stack([plate, np.full(8, z)]) for z in (cz - 0.6, cz - deck.back_mm + 0.7)]
+    for z in (0.8, deck.foot_mm - 0.9):
         layers.append(np.column_stack([pad, np.full(8, z)]) @ deck.rotation().T + np.array(deck.centre))
     return np.concatenate(layers)

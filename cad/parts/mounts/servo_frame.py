@@ -1,7 +1,8 @@
 """Servo frame: holds a servo by the threads in its front, if its rear has no usable ones.
 
 Frame: rotation frame at gamma = 0 (`cad/layout/direct/frame.py`), mm. A plate with an opening around the horn, sides
-along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount.
+along the case with a window for the servo's plug, and four feet with holes for the screws of deck or mount, and slots
+for their nuts.
 """
 
 import math
@@ -16,9 +17,12 @@ from scanwright.cad.layout.direct.frame import (
     EAR_NUT,
     EAR_SCREW,
     FOOT,
+    FOOT_REACH,
+    FOOT_SCREW,
     GRIP,
     HEADER,
     LEAST_BRIDGE,
+    NUT_PLAY,
     ServoFrame,
 )
 from scanwright.cad.layout.drive import Ears
@@ -59,7 +63,7 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
     (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + p.leg
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
         body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
-        feet = [solids.box((-p.reach_x, a, p.low), (p.reach_x, b, p.low + FOOT)) for a, b in ((y0, w0), (w1, y1))]
+        feet = [solids.hull(p.feet_corners(*span)) for span in ((y0, w0), (w1, y1))]
         inside = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
         window = solids.box((-p.reach_x - 1.0, w0, p.low - 1.0), (p.reach_x + 1.0, w1, p.plate - HEADER))
         body = checked(body.fuse(*feet).cut(inside, window).clean())
@@ -69,6 +73,10 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
             cuts.append(solids.box((-p.opening, 0.0, p.plate - 1.0), (p.opening, y1 + 1.0, p.high + 1.0)))
         cuts += [solids.upright(p.hole / 2, p.plate - 1.0, p.high + 1.0, x, y) for x, y in p.holes]
         cuts += [solids.upright(p.foot_hole / 2, p.low - 1.0, p.low + FOOT + 1.0, x, y) for x, y in p.feet]
+        half, inner = (FOOT_SCREW.nut_across + NUT_PLAY) / 2, FOOT_SCREW.nut_across / math.sqrt(3) + NUT_PLAY
+        for x, y in p.feet:  # slots of the nuts
+            ends = sorted((x - math.copysign(inner, x), math.copysign(p.reach_x + 1.0, x)))
+            cuts.append(solids.box((ends[0], y - half, p.low + FOOT), (ends[1], y + half, p.low + FOOT + FOOT_REACH)))
         if p.ears is not None:
             cuts += _ear_holes(p, p.ears)
         return checked(body.cut(*cuts).clean())

@@ -13,7 +13,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
-from scanwright.cad.layout.deck import FOOT_THICKNESS, OVER_NUTS, Deck, TripodFoot
+from scanwright.cad.layout.deck import OVER_NUTS, Deck, TripodFoot
 from scanwright.cad.layout.joints import DECK_MM, Joint, fixing_in, placed_axes, screws, upright_axes
 from scanwright.cad.layout.names import BASE_MOUNT, TRIPOD, TRIPOD_FOOT
 from scanwright.cad.layout.placement import Placement
@@ -57,8 +57,8 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
         TRIPOD_FOOT,
         fixing_in(p.mount),
         deck.screw,
-        placed_axes(upright_axes(deck.deck_holes, FOOT_THICKNESS, -1.0), R, deck.centre),
-        grip_mm=FOOT_THICKNESS,
+        placed_axes(upright_axes(deck.deck_holes, deck.foot_mm, -1.0), R, deck.centre),
+        grip_mm=deck.foot_mm,
         thread_mm=p.thickness if p.mount.trap is None else OVER_NUTS,
         thread=p.mount,
     )

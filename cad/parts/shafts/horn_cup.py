@@ -15,7 +15,7 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.joints import horn_centres, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP, SERVO_HORN
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.layout.rotor.linkage import BEFORE_NUT, AlignmentLinkage
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
 from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, spigot_in_hub, to_centre
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
 from scanwright.cad.screws import SCREWS, Trap, passing_hole
@@ -81,14 +81,15 @@ def _cross_holes(p: AlignmentLinkage, azimuth: float) -> list[cq.Solid]:
     stack, thread = p.stack, p.cross_thread
     assert thread is not None  # as in every cup
     bore, outer, trap = stack.cup_bore / 2, stack.shaft_diameter / 2, thread.trap
-    start = bore - 1.0 if trap is None else outer - BEFORE_NUT - 0.1
+    start = bore - 1.0 if trap is None else outer - stack.cross_screw.before_nut - 0.1
     hole = solids.radial(thread.hole / 2, azimuth, stack.cross, start, outer + 1.0 - start)
     return [hole] if trap is None else [hole, *_slots(p, trap, azimuth)]
 
 
 def _slots(p: AlignmentLinkage, trap: Trap, azimuth: float) -> list[cq.Solid]:
     """Return the slot of a nut, inserted before the hub, and a narrower one behind it for the screw's end."""
-    stack, outer, top = p.stack, p.stack.shaft_diameter / 2 - BEFORE_NUT, p.stack.spigot_top + 1.0
+    stack, top = p.stack, p.stack.spigot_top + 1.0
+    outer = stack.shaft_diameter / 2 - stack.cross_screw.before_nut
     nut, end = trap.across / 2, p.cross_hole / 2
     cuts = [
         solids.box((outer - trap.depth, -nut, stack.cross - trap.corner), (outer, nut, top)),

@@ -18,7 +18,7 @@ from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.layout.rotor.linkage import CROSS_AT, CROSS_SCREW
+from scanwright.cad.layout.rotor.linkage import CROSS_AT
 from scanwright.cad.parts.part_spec import (
     HORN,
     SEATED,
@@ -111,7 +111,7 @@ def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
 
 def cross_holes(stack: Hub) -> list[cq.Solid]:
     """Return tapped holes through the spigot at all azimuths that a linkage may need."""
-    core, reach = CROSS_SCREW.core / 2, stack.shaft_diameter
+    core, reach = stack.cross_screw.screw.core / 2, stack.shaft_diameter
     return [solids.radial(core, azimuth, stack.cross, -reach, 2 * reach) for azimuth in CROSS_AT[:2]]
 
 
@@ -119,8 +119,8 @@ def cross_words(stack: Hub) -> tuple[str, ...]:
     """Return the note of a shaft's sheet on its cross holes."""
     down = stack.spigot_top - stack.cross
     return (
-        f"2 x {CROSS_SCREW.name} through the spigot, square to each other at 45 deg to the flat, {down:g} below its "
-        "end: tapped from all four sides.",
+        f"2 x {stack.cross_screw.screw.name} through the spigot, square to each other at 45 deg to the flat, "
+        f"{down:g} below its end: tapped from all four sides.",
     )
 
 

@@ -10,6 +10,7 @@ from scanners import CAPSULE, GROUND_AHEAD, ROLLING, scanner_at
 import scanwright.cad.checks.loads.retention as room
 from scanwright.cad import solids
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
+from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.joints import ScrewAxis
 from scanwright.cad.layout.tightening import ALUMINIUM, BOUGHT, MOULDED, PRINTED, hold_of, stress_area_mm2
 from scanwright.cad.screws import SCREWS, thread_in_part
@@ -54,6 +55,22 @@ def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
     assert hanging_on(assembly, deck) >= {"lidar", "servo", "base_mount", *assembly.made}
 
 
+def test_a_bearing_takes_load_off_the_horn_and_gives_it_to_its_cage(scanner_and_assembly, monkeypatch):
+    scanner, assembly = scanner_and_assembly
+    if assembly.layout.drive.of(BearingCage) is None:
+        return
+
+    def margins():
+        return {c.subject: c.value for c in retention_checks(assembly) if c.code == "retention"}
+
+    shared = margins()
+    monkeypatch.setattr(room, "_borne", lambda *_: (np.zeros(3), 0.0))
+    alone = margins()
+    changed = {subject: shared[subject] / alone[subject] for subject in alone if shared[subject] != alone[subject]}
+    assert changed.pop("servo_shaft") > 1.5
+    assert set(changed) == {"slip_ring_adapter", "bearing_cage"} and max(changed.values()) < 0.5
+
+
 def test_everything_holds_five_g_and_every_screw_has_its_thread(scanner_and_assembly):
     _, assembly = scanner_and_assembly
     checks = retention_checks(assembly)
@@ -96,11 +113,12 @@ def _instead(assembly, joint, other):
     return replace(assembly, layout=replace(assembly.layout, joints=changed))
 
 
-def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
+@pytest.mark.parametrize("share", [0.0, 0.7, -1.3])
+def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly, share):
     """The least sum of squares that is in equilibrium, found without a stiffness; and every direction tried."""
     scanner, assembly = scanner_and_assembly
     joint = joint_of(assembly, "alignment_linkage", "lidar_body")
-    centre = np.array([0.02, -0.03, 0.05])
+    centre, bearing = np.array([0.02, -0.03, 0.05]), np.array([0.0, 0.0, -0.08])
     start = np.array([axis.start for axis in joint.axes]) / 1000
     along = np.array([axis.along for axis in joint.axes])
     balance = np.zeros((6, 3 * joint.count))
@@ -111,11 +129,13 @@ def test_a_force_is_shared_as_equal_springs_share_it(scanner_and_assembly):
     directions = np.random.default_rng(0).normal(size=(4000, 3))
     pull = push = 0.0
     for force in directions / np.linalg.norm(directions, axis=1)[:, None]:
-        shares = (np.linalg.pinv(balance) @ np.concatenate([force, np.cross(centre, force)])).reshape(-1, 3)
+        more = share * force * [1, 1, 0]
+        moment = np.cross(centre, force) + np.cross(bearing, more)
+        shares = (np.linalg.pinv(balance) @ np.concatenate([force + more, moment])).reshape(-1, 3)
         axial = (shares * along).sum(axis=1)
         pull = max(pull, np.abs(axial).max())
         push = max(push, np.linalg.norm(shares - axial[:, None] * along, axis=1).max())
-    assert worst_shares(joint, centre) == pytest.approx((pull, push), rel=5e-3)
+    assert worst_shares(joint, centre, (bearing, share)) == pytest.approx((pull, push), rel=5e-3)
     assert scanner.lidar.base.screw == joint.screw.name
 
 

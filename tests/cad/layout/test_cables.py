@@ -17,6 +17,7 @@ from scanwright.cad.layout.cables.leads import (
 )
 from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
+from scanwright.cad.layout.direct.stack import CAGE_SEAT_WALL
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.design.angles import Angles, AngleSet
@@ -169,9 +170,18 @@ def test_the_leads_of_a_stator_leave_its_end_beside_flange_and_case_and_their_pl
         assert corners[1, 2] < cage.low, "straight through the base"
 
 
+def test_the_hub_is_as_wide_as_the_bearing_that_the_leads_need():
+    for thick in np.random.default_rng(6).uniform(4.0, 15.0, 3):
+        stack = layout_for("bearing", lead_diameter_mm=thick).stack
+        assert stack.leads_radius + stack.lead_diameter / 2 < stack.bearing.bore_mm / 2 < stack.hub_radius
+        seat = stack.bearing.outer_mm / 2 + CAGE_SEAT_WALL
+        cage = max(seat / -stack.cage_top, stack.cage_outer / -stack.cage_roof)
+        assert stack.hub_radius / stack.h <= cage, "a hub in the shadow of the cage"
+
+
 def test_a_ring_whose_leads_pass_no_bearing_is_refused_with_what_to_do():
-    with pytest.raises(BuildError, match=r"lead_diameter_mm = 9\.5 .*take a ring with fewer circuits"):
-        layout_for("bearing", lead_diameter_mm=9.5)
+    with pytest.raises(BuildError, match=r"lead_diameter_mm = 18\.0 .*take a ring with fewer circuits"):
+        layout_for("bearing", lead_diameter_mm=18.0)
 
 
 @pytest.mark.parametrize("setting", SETTINGS)

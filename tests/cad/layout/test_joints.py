@@ -19,7 +19,6 @@ from scanners import CAPSULE, GROUND_AHEAD, ROLLING, TILTED, UPRIGHT, scanner_at
 
 from scanwright.cad.geometry.holes import Piercing, rounds_of
 from scanwright.cad.layout.joints import DECK_MM, shank_mm
-from scanwright.cad.layout.rotor.linkage import CROSS_WASHER_THICK
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.cad.screws import SCREWS, thread_in_part, trap_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
@@ -208,7 +207,7 @@ def test_the_declared_joints_are_those_that_the_solids_have(name, parts_of):
     for key, ((fixing, screw, trap), holes) in read.items():
         joint = declared[key]
         assert (joint.fixing, joint.screw.name, joint.count, joint.traps) == (fixing, screw, len(holes), trap), key
-        washer = 0.0 if joint.washer_mm is None else CROSS_WASHER_THICK
+        washer = 0.0 if joint.washer_mm is None else assembly.layout.stack.cross_screw.washer_thick
         # of a tilted part the kernel knows it to a nanometre
         grip = round(washer + max(hole.length for hole, _ in holes), 3)
         depth = min(behind.depth for _, behind in holes)

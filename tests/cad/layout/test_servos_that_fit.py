@@ -10,6 +10,7 @@ import pytest
 from quick_tests import samples
 
 from benchmarks.cad.combinations import screws_without_a_hole
+from scanwright.cad.assembly.bought import servo_case, servo_horn
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.clearance import clearance_checks
 from scanwright.cad.checks.loads.retention import retention_checks, worst_shares
@@ -21,6 +22,7 @@ from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.cad.screws import SCREWS
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
@@ -52,6 +54,12 @@ def test_an_xm430_is_laid_out_with_a_frame_and_every_lidar_by_the_holes_it_has(l
     assert joints["servo_case"].length_mm - joints["servo_case"].grip_mm == 2.5  # of 3.0, one diameter
     assert joints["lidar_body"].count == holes
     assert joints["lidar_body"].fixing == ("nut" if lidar == "STL27L" else "thread")
+
+
+@pytest.mark.parametrize("servo", [product.name for product in CATALOGUE if isinstance(product, Servo)])
+def test_no_horn_is_drawn_inside_its_case(servo):
+    record = CATALOGUE.products[servo]
+    assert servo_case(record, 0.0).intersect(servo_horn(record, 0.0)).Volume() < 1e-6
 
 
 def test_every_screw_into_a_device_meets_a_hole_and_one_that_does_not_is_found():
@@ -239,8 +247,9 @@ def test_a_ring_still_asks_for_a_turned_shaft():
 
 
 def test_a_refusal_that_rests_on_a_number_nobody_has_verified_says_so():
-    with pytest.raises(BuildError, match=r"lead_diameter_mm = 9.5 \(not verified: measure yours\): the axis needs"):
-        laid_out(scanner_for("MX-28", "UST-10LX", "UH1256-02-0610-06S"))
+    scanner = scanner_for("MX-28", "UST-10LX", "UH1256-02-0610-06S")
+    with pytest.raises(BuildError, match=r"lead_diameter_mm = 19.0 \(not verified: measure yours\): the axis needs"):
+        laid_out(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update={"lead_diameter_mm": 19.0})))
 
 
 @pytest.mark.parametrize(

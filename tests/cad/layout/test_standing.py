@@ -7,7 +7,6 @@ import pytest
 from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
 from scanwright.cad.layout.cables.fixed import fixed_cables_of
-from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.placement import placement_of
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.deck_holes import Rectangle
@@ -39,7 +38,7 @@ def test_every_cable_leaves_its_device_and_keeps_its_bend(setting, products):
         R, centre = layout.deck.rotation(), np.array(layout.deck.centre)
         end = (points[-1] - centre) @ R
         half = np.array(layout.deck.foot[:2])
-        assert (np.abs(end[:2]) > half).any() and abs(end[2] - FOOT_THICKNESS - lead.diameter / 2) < 1.5
+        assert (np.abs(end[:2]) > half).any() and abs(end[2] - layout.deck.foot_mm - lead.diameter / 2) < 1.5
         assert (((points - centre) @ R)[:, 2] > lead.diameter / 2).all()
     middles = [lead.path.points(1.0) for lead in leads]
     apart = np.linalg.norm(middles[0][:, None] - middles[1], axis=2).min()
@@ -54,7 +53,7 @@ def test_on_the_foot_each_lies_between_two_slots(ground_ahead):
         for seat in deck.ties:
             out = seat.direction()
             along, across = points @ out, points @ [-out[1], out[0], 0.0]
-            over = (along > seat.first) & (along < seat.last) & (points[:, 2] < FOOT_THICKNESS + lead.diameter)
+            over = (along > seat.first) & (along < seat.last) & (points[:, 2] < deck.foot_mm + lead.diameter)
             inside.append(over.any() and (np.abs(across[over]) + lead.diameter / 2 < seat.half).all())
         assert inside.count(True) == 1
 

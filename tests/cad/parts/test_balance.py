@@ -20,9 +20,12 @@ from scanwright.cad.geometry.inertia import of_line, of_solid
 from scanwright.cad.layout.cables.leads import SAMPLE
 from scanwright.cad.layout.loads import RUBS_NM
 from scanwright.cad.layout.placement import placement_of
+from scanwright.cad.layout.rotor import counterweight
 from scanwright.cad.layout.rotor.counterweight import SAW, SECTIONS, TRIM, Counterweight
 from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, torque_nm
 from scanwright.cad.layout.rotor.linkage import Ear, neck_corners
+from scanwright.cad.parts.linkage.linkage_hub import hub
+from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.motion import Sweep
 from scanwright.studio.view.scanner_bodies import make_bodies
@@ -218,3 +221,17 @@ def test_a_servo_without_play_needs_none():
     assert "less than the noise" in found_for(exact).why
     untold = replace(scanner, servo=scanner.servo.model_copy(update={"backlash_deg": None}))
     assert isinstance(found_for(untold), Counterweight)
+
+
+@pytest.mark.parametrize("servo", ["XC330-M288", "XM430-W350", "MX-64R", "STS3215"])
+def test_an_ear_and_its_hub_are_one_body_on_every_shaft(servo):
+    rng = np.random.default_rng(3)
+    for ring in (None, "SNU11-P0210", "SRC022A-6"):
+        try:
+            scanner = scanner_at((0, 20, 40, 5), sensor="UST-10LX", servo=servo, slip_ring=ring)
+            bare = bare_linkage(scanner)
+        except BuildError:  # this servo carries no such ring
+            continue
+        section = SECTIONS[rng.integers(len(SECTIONS))]
+        ear = counterweight._bar(scanner, bare, rng.uniform(-np.pi, np.pi), section).ear
+        assert len(hub(replace(bare, ear=ear)).Solids()) == 1

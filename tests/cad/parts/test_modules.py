@@ -14,7 +14,6 @@ from scanwright.cad.assembly.shadow import PartsWorkshop
 from scanwright.cad.checks.loads.retention import hanging_on, retention_checks, worst_shares
 from scanwright.cad.checks.products import module_checks
 from scanwright.cad.files.bom import items_of
-from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import LIDAR
 from scanwright.cad.layout.placement import placement_of
 from scanwright.design.errors import BuildError
@@ -76,7 +75,9 @@ def test_the_lidar_hangs_on_a_nut_of_the_tripod_and_no_screw_ends_in_plastic(on_
     assert ("base_mount", "deck") not in joints
     assert of_mount.traps and of_tripod.traps and of_tripod.count == 1
     assert LIDAR in hanging_on(on_tripod, of_tripod) and "base_mount" in hanging_on(on_tripod, of_tripod)
-    assert of_mount.length_mm <= FOOT_THICKNESS + on_tripod.layout.deck.tripod.thickness  # nothing stands out below
+    assert (
+        of_mount.length_mm <= on_tripod.layout.deck.foot_mm + on_tripod.layout.deck.tripod.thickness
+    )  # nothing stands out below
     said = [check for check in retention_checks(on_tripod) if "tripod" in check.message]
     assert {check.code for check in said} == {"retention", "screw"}
     assert {check.severity for check in said} == {"ok"}

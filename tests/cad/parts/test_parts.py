@@ -13,7 +13,7 @@ from quick_tests import samples
 from scanners import GROUND_AHEAD, UPRIGHT, mount_offset_mm, scanner_at
 
 from scanwright.cad.checks.products import unverified_checks
-from scanwright.cad.layout.deck import FOOT_THICKNESS
+from scanwright.cad.layout.deck import FOOT_MM
 from scanwright.cad.layout.names import SERVO_CABLE, STATOR_LEADS
 
 # name: alpha_rot, beta_rot, alpha_laser, beta_laser, lidar, servo; hundreds more: `python -m benchmarks.cad.parts`
@@ -187,7 +187,7 @@ def test_everything_stands_clear_of_the_deck(built):
         return
     assert height.pop("base_mount") == pytest.approx(0, abs=1e-3)
     lying = [height.pop(name) for name in (SERVO_CABLE, STATOR_LEADS) if name in height]
-    assert min(lying, default=np.inf) > FOOT_THICKNESS
+    assert min(lying, default=np.inf) > FOOT_MM[0]
     assert min(height.values()) > 8
     # the lidar's sphere misses the foot in every position
     radius = max(np.linalg.norm(built.meshes[n].vertices, axis=1).max() for n in built.meshes if n.startswith("lidar"))

@@ -9,7 +9,6 @@ from scanners import CAPSULE, GROUND_AHEAD, scanner_at
 
 from scanwright.cad.assembly.scenes import steps_of, tied_at
 from scanwright.cad.layout.cables.leads import tied_mm
-from scanwright.cad.layout.deck import FOOT_THICKNESS
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT, COUNTERWEIGHT, HUB_TIE, PLATE_TIE, ROTOR_LEADS
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS
 from scanwright.cad.parts.all_parts import laid_out
@@ -67,7 +66,7 @@ def test_a_tie_goes_through_the_foot_and_below_it(parts_of):
         across = np.linspace(0.0, seat.half + SLOT_ACROSS / 2, 8)
         groove = seat.points(middle, np.concatenate([-across, across]), np.array([0.1, TIE[1]]))
         sides = (seat.half + SLOT_ACROSS / 2) * np.array([-1.0, 1.0])
-        slots = seat.points(middle, sides, np.linspace(0.0, FOOT_THICKNESS + 1.0, 8))
+        slots = seat.points(middle, sides, np.linspace(0.0, deck.foot_mm + 1.0, 8))
         tie = np.concatenate([groove, slots]) @ deck.rotation().T + np.array(deck.centre)
         assert not filled(assembly, tie, BASE_MOUNT).any()
 

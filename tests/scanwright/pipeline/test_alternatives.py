@@ -14,7 +14,7 @@ from scanwright.pipeline.alternatives import what_fits
 TASK = """
 name = "heavy"
 sensor = "{sensor}"
-servo = "XM540-W270"
+servo = "XC330-M288"
 slip_ring = "SNU11-P0210"
 [motion]
 mode = "spin"
