@@ -6,14 +6,13 @@ Constant limits are here, with their reason; limits of products, printer or layo
 from dataclasses import replace
 from typing import NamedTuple
 
-from scanwright.cad.layout.tightening import HELD_G, LEAST_MARGIN
+from scanwright.cad.layout.tightening import HELD_G, LEAST_MARGIN, SHOCK_G
 from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
 LINKAGE_HIDES_SHARE = 0.03  # of the field of view, beyond servo, ring and shaft; J with parts accounts for it
-SHOCK_G = 5.0  # bumps and transport: assumed
 FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
 LEAN_DEG = 1.0  # more than a pose on a robot is usually known to
 THIN_SHARE = 0.01  # of the surface: below it a thin spot is a flaw, above it the part is unusable
@@ -128,7 +127,7 @@ CHANGES = {
     "tilt_moment": STRONGER,
     "axial_load": STRONGER,
     "bearing_load": LIGHTER,
-    "belt_tension": f"take a longer period_s in [motion], or {LIGHTER}",
+    "belt_tension": f"take a longer period_s in [motion], a ring with a bore (slip_ring), or {LIGHTER}",
     "waist_torque": "choose a servo with a smaller stall torque (servo)",
     "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
     "retention": "if a printed part yields, choose a printer profile with nuts or inserts (printer); otherwise a servo "

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -140,6 +140,14 @@ class Mounted:
     thread: Thread | None = None  # of a printed one
 
 
+class TorqueLimit(NamedTuple):
+    """A limit of the torque that a drive can hold."""
+
+    nm: float
+    by: str  # product and property
+    instead: str  # what has a higher one
+
+
 LeadExit = tuple[TieSeat | None, tuple[tuple[Array, Array], ...]]
 """An exit for the leads of the ring's rotor: its tie, and alternative corners (k, 3) with a direction outwards (3,)."""
 
@@ -188,6 +196,7 @@ class DriveLayout:
     stator_exit: StatorExit | None  # of the leads of the ring's stator, if the catalogue states it
     # whether the servo bears a counterweight of a mass [g] at a height in addition to the rotor
     bears: Callable[[float, float], bool]
+    limits: tuple[TorqueLimit, ...]  # of the torque about its axis in work
     built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
     plain: bool  # whether two pairs of front holes, away from all that turns, carry the parts on the servo
@@ -213,6 +222,11 @@ class DriveLayout:
         """Stations of the bought products, with mass [g] and box."""
         stations = ((each, each.product, each.box) for each in self.stations)
         return tuple((each, product.mass_g, box) for each, product, box in stations if product and box)
+
+
+def servo_limit(servo: Servo) -> TorqueLimit:
+    """Return the limit of a servo."""
+    return TorqueLimit(servo.continuous_torque_nm, f"a fifth of the stall torque of {servo.name}", "a stronger servo")
 
 
 def towards(points: Array, azimuth: float) -> tuple[Array, Array]:

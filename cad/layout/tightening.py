@@ -17,6 +17,7 @@ NUT_FACTOR = 0.2  # torque over preload and diameter, dry: the usual estimate
 FLANKS = 0.5  # of the cylinder at the nominal diameter that a thread shears off: makers' tables state 0.5 to 0.8
 INSERT_N = 300.0  # pull-out of a heat-set insert: half of sellers' measurements for M3 in PLA, assumed
 FRICTION = 0.15  # of plastic on metal or plastic, dry: the low end of measured values
+SHOCK_G = 5.0  # bumps and transport: assumed
 HELD_G = 2.0  # bumps that must not turn the mount: assumed
 LEAST_MARGIN = 2.0  # over strengths that are makers' or assumed
 

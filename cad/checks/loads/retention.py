@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly, lidar_body
-from scanwright.cad.checks.table import SHOCK_G, at_least, tidy
+from scanwright.cad.checks.table import at_least, tidy
 from scanwright.cad.geometry import inertia
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.direct.cage import BearingCage, share_weight
@@ -36,6 +36,7 @@ from scanwright.cad.layout.tightening import (
     LEAST_MARGIN,
     MOULDED,
     PRINTED,
+    SHOCK_G,
     STEEL,
     Hold,
     Material,

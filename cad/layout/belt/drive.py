@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from scanwright.cad.layout import names
-from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_shaft_bend
+from scanwright.cad.layout.belt.loads import SEAT_N_PER_M, belt_limits, belt_shaft_bend
 from scanwright.cad.layout.belt.sizing import belt_stack
 from scanwright.cad.layout.belt.stack import (
     BOSS,
@@ -28,7 +28,7 @@ from scanwright.cad.layout.belt.stack import (
     tower_corners,
     tower_foot_of,
 )
-from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit
+from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit, servo_limit
 from scanwright.cad.layout.envelope import Box, Envelope, box_corners
 from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
 from scanwright.cad.layout.joints import triple
@@ -80,6 +80,7 @@ def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         no_hub_tie="the leads leave the hollow shaft below the hub: they are tied around it",
         stator_exit=StatorExit(np.array([0.0, 0.0, stack.ring_bottom]), stack.ring_bottom - mounted.rear, stiff=False),
         bears=_bears,
+        limits=(servo_limit(scanner.servo), *belt_limits(scanner, stack)),
         built=BUILT,
         left_out=(LeftOut(names.BEARING_CAGE, "the two bearings of the tower carry the axis", 1, "parts"),),
         plain=plate.opening > pulley_foot_radius(scanner.servo) + THIN_GAP,

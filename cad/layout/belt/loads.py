@@ -4,12 +4,15 @@ SI units; lengths of the stack are millimetres.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from scanwright.cad.layout.belt.stack import BeltStack
-from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight
+from scanwright.cad.layout.drive import TorqueLimit
+from scanwright.cad.layout.loads import ALUMINIUM_PA, METAL_POISSON, ShaftBend, Weight, rated_moment_nm
+from scanwright.design.scanner import Scanner
 
 PRELOAD_N = 10.0  # least, of each strand: assumed for the seat of a small belt in its grooves
 SEAT_N_PER_M = 10e6  # sideways stiffness of a bearing in a printed seat: assumed
@@ -32,6 +35,16 @@ def belt_pull(stack: BeltStack, torque_nm: float) -> BeltPull:
     strand = max(PRELOAD_N, PRELOAD_SHARE * working)
     lever = (stack.belt_middle - stack.horn) / 1000
     return BeltPull(working, strand, 2 * strand, 2 * strand * lever)
+
+
+def belt_limits(scanner: Scanner, stack: BeltStack) -> Iterator[TorqueLimit]:
+    """Yield the limits of the belt and, if it is rated, of the servo's horn."""
+    radius, bored = stack.pitch_radius / 1000, "a ring with a bore"
+    most_n = stack.belt.working_tension_n / (PRELOAD_SHARE + 0.5)
+    yield TorqueLimit(most_n * radius, f"the working tension of {stack.belt.name}", bored)
+    if (rated := rated_moment_nm(scanner)) is not None:
+        most_n = rated / (2 * PRELOAD_SHARE * (stack.belt_middle - stack.horn) / 1000)
+        yield TorqueLimit(most_n * radius, f"the pull of the belt on the horn of {scanner.servo.name}", bored)
 
 
 def carrier_forces(stack: BeltStack, weight: Weight, centre_mm: float, pull_n: float) -> tuple[float, float]:

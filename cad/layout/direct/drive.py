@@ -11,7 +11,17 @@ from scanwright.cad.layout.direct.frame import FOOT, FOOT_SCREW, ServoFrame, cor
 from scanwright.cad.layout.direct.loads import horn_bears, horn_bears_balanced, shaft_bend, shaft_modulus_pa
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.direct.stack import BELOW_HUB, DirectStack
-from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit, towards
+from scanwright.cad.layout.drive import (
+    Bundle,
+    DriveLayout,
+    LeadExit,
+    Mounted,
+    Rod,
+    Station,
+    StatorExit,
+    servo_limit,
+    towards,
+)
 from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
 from scanwright.cad.layout.hub import BUNDLE_GAP
 from scanwright.cad.layout.joints import fixing_of
@@ -104,6 +114,7 @@ def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
         no_hub_tie="",
         stator_exit=None if scanner.slip_ring is None else stator_exit(scanner, stack, cage),
         bears=partial(_bears, scanner, stack),
+        limits=(servo_limit(scanner.servo),),
         built=BUILT,
         left_out=tuple(_left_out(scanner, stack, frame)),
         plain=framed is None,

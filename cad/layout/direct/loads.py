@@ -13,6 +13,7 @@ import numpy as np
 from scanwright.cad.layout.direct.stack import CAGE_SEAT_WALL, DirectStack
 from scanwright.cad.layout.envelope import sub_plate_cm3
 from scanwright.cad.layout.hub import BUNDLE_GAP, JOURNAL_WALL
+from scanwright.cad.layout.joints import horn_joint
 from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
@@ -23,7 +24,9 @@ from scanwright.cad.layout.loads import (
     trusted_moment_nm,
     weight_of,
 )
-from scanwright.cad.layout.names import BEARING_CAGE
+from scanwright.cad.layout.names import BEARING_CAGE, SERVO_HORN
+from scanwright.cad.layout.tightening import ALUMINIUM as TURNED
+from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, SHOCK_G, hold_of
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.errors import BuildError
 from scanwright.design.frames import STANDARD_GRAVITY_M_S2
@@ -31,6 +34,8 @@ from scanwright.design.scanner import Scanner
 
 LINKAGE_CM3 = 125.0  # the heaviest linkage of the 300 settings of benchmarks/cad/parts.py, rounded up
 LINKAGE_OFF_AXIS_MM = 20.0
+PRISM_SHARE = 0.4  # of a prism from a large lidar's base to the hub that its linkage fills: up to LMS111, 450 cm3
+SEAT_SHARE = 0.8  # of the distance of its base from the axis at which such a linkage has its centre
 LEADS_DEPTH = 6.0  # least depth of the channel for the ring's leads
 SHEAR_SHARE = 0.9  # of a round section that carries shear
 
@@ -87,11 +92,18 @@ def bearing_for(scanner: Scanner, stack: DirectStack) -> Bearing | None:
 
 
 def horn_bears(scanner: Scanner, stack: DirectStack) -> bool:
-    """Return whether the horn bears the heaviest linkage of any angles without a bearing.
+    """Return whether the horn bears the heaviest linkage of any angles without a bearing, and its screws a shock of it.
 
     A horn without a rating is assumed to bear little.
     """
-    return heaviest(scanner, stack).moment_nm <= trusted_moment_nm(scanner)
+    weight, servo = heaviest(scanner, stack), scanner.servo
+    lever_m = math.hypot(weight.lever_m, weight.off_axis_m)
+    per_screw = (1 + 4000 * lever_m / servo.horn_circle_mm) / servo.horn_holes  # equal springs on a circle
+    pull_n = SHOCK_G * math.hypot(weight.across_n, weight.along_n) * per_screw
+    joint = horn_joint(servo, stack.shaft, SERVO_HORN, stack.horn + stack.horn_grip, stack.horn_grip)
+    printed = stack.cup_bore > 0
+    hold = hold_of(joint, PRINTED if printed else TURNED, MOULDED if servo.horn_kind == "self_tapping" else BOUGHT)
+    return weight.moment_nm <= trusted_moment_nm(scanner) and hold is not None and pull_n <= hold.pull_n
 
 
 def horn_bears_balanced(scanner: Scanner, stack: DirectStack, bar_g: float, bar_z: float) -> bool:
@@ -173,10 +185,14 @@ def heaviest(scanner: Scanner, stack: DirectStack) -> Weight:
     """Return the weight of the rotor with the heaviest linkage."""
     lidar, ring = scanner.lidar, scanner.slip_ring
     normal = stack.R()[:, 2]
+    lies = math.hypot(normal[0], normal[1])
     middle = lidar.body_mm[2] / 2 - lidar.optical_height_mm
+    prism = PRISM_SHARE * 4 * lidar.half_mm[0] * lidar.half_mm[1] * stack.h / 1000
+    larger = max(1.0, prism / LINKAGE_CM3)
+    off_axis = max(LINKAGE_OFF_AXIS_MM, min(larger * LINKAGE_OFF_AXIS_MM, SEAT_SHARE * lidar.optical_height_mm * lies))
     bodies = [  # mass [g], height, distance from the axis
-        (lidar.mass_g, middle * float(normal[2]), abs(middle) * math.hypot(normal[0], normal[1])),
-        ((LINKAGE_CM3 + sub_plate_cm3(lidar)) * scanner.printer.density_g_cm3, -stack.h / 2, LINKAGE_OFF_AXIS_MM),
+        (lidar.mass_g, middle * float(normal[2]), abs(middle) * lies),
+        ((larger * LINKAGE_CM3 + sub_plate_cm3(lidar)) * scanner.printer.density_g_cm3, -stack.h / 2, off_axis),
         (_shaft_g(scanner, stack), (stack.spigot_top + stack.horn) / 2, 0.0),
     ]
     if ring is not None:

@@ -24,6 +24,7 @@ from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
+from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
 
@@ -58,6 +59,7 @@ SCREWS_AT = (9.0, 25.0)  # from the inner end of the bar
 LEAST_LENGTH = 32.0  # covers the screws
 LONGER = 2.0  # than estimated the bar may become (measured: 1.5)
 GAP = 1.0
+ESTIMATED = 0.9  # of an estimated torque is sure: linkage within 3 %, the lidar's centre within 2 mm
 STEP = 2.0  # of the points in a bar
 SAW = 0.5  # lengths are cut to this
 
@@ -106,19 +108,38 @@ def counterweight_of(
     plate_ties: tuple[TieSeat, ...],
     neck: Array,
 ) -> Counterweight | LeftOut:
-    """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3)."""
-    if not backlash_matters(scanner):
+    """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3).
+
+    Raises:
+        BuildError: there is none, and servo or belt cannot hold the rotor.
+    """
+    upright = tilt_sine(scanner) < UPRIGHT
+    moment = np.zeros(2) if upright else estimated_moment(scanner, linkage, neck)
+    torque, limit = torque_nm(scanner, float(np.linalg.norm(moment))), min(drive.limits)
+    free = _FreeSpace(drive, deck, linkage, plate_ties, neck)
+    found = _found(scanner, linkage, moment, free, required=torque > limit.nm)
+    if isinstance(found, LeftOut) and ESTIMATED * torque > limit.nm:
+        raise BuildError(
+            f"{COUNTERWEIGHT}: gravity turns the rotor with {torque:.2f} N m, {limit.by} allows {limit.nm:.2f}, and "
+            f"{found.why}; take {limit.instead}, a lighter lidar, or other angles"
+        )
+    return found
+
+
+def _found(
+    scanner: Scanner, linkage: AlignmentLinkage, moment: Array, free: _FreeSpace, *, required: bool
+) -> Counterweight | LeftOut:
+    if not required and not backlash_matters(scanner):
         return _without(f"the backlash of {scanner.servo.name} is less than the noise of {scanner.lidar.name}")
     if tilt_sine(scanner) < UPRIGHT:
         return _without("gravity does not turn an upright axis")
-    moment = estimated_moment(scanner, linkage, neck)
     least, _ = friction_nm(scanner)
     if torque_nm(scanner, float(np.linalg.norm(moment))) <= least:
         return _without(f"gravity turns the rotor with no more than the friction of bearing and ring, {least:g} N m")
-    if keeps_flank(scanner, moment):
+    if not required and keeps_flank(scanner, moment):
         return _without("gravity keeps the gears on one flank during the entire sweep")
     azimuth = math.radians(round(math.degrees(math.atan2(-moment[1], -moment[0]))))
-    free, fault = _FreeSpace(drive, deck, linkage, plate_ties, neck), ""
+    fault = ""
     for section in SECTIONS:
         bar = _bar(scanner, linkage, azimuth, section)
         ear, density = bar.ear, scanner.printer.density_g_cm3 / 1000

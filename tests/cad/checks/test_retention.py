@@ -56,7 +56,7 @@ def test_what_hangs_on_a_joint_is_what_falls_with_it(scanner_and_assembly):
 
 
 def test_a_bearing_takes_load_off_the_horn_and_gives_it_to_its_cage(scanner_and_assembly, monkeypatch):
-    scanner, assembly = scanner_and_assembly
+    _, assembly = scanner_and_assembly
     if assembly.layout.drive.of(BearingCage) is None:
         return
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from scanners import GROUND_AHEAD, ROLLING, bare_linkage, scanner_at
+from scanners import CAPSULE, GROUND_AHEAD, ROLLING, bare_linkage, scanner_at
 
 from scanwright.cad.assembly.assembly import link_bodies, rotor_moment, rotor_of
 from scanwright.cad.assembly.make import make_parts
@@ -19,7 +19,7 @@ from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.geometry.inertia import of_line, of_solid
 from scanwright.cad.layout.cables.leads import SAMPLE
 from scanwright.cad.layout.loads import RUBS_NM
-from scanwright.cad.layout.placement import placement_of
+from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.layout.rotor import counterweight
 from scanwright.cad.layout.rotor.counterweight import SAW, SECTIONS, TRIM, Counterweight
 from scanwright.cad.layout.rotor.imbalance import estimated_moment, keeps_flank, torque_nm
@@ -235,3 +235,22 @@ def test_an_ear_and_its_hub_are_one_body_on_every_shaft(servo):
         section = SECTIONS[rng.integers(len(SECTIONS))]
         ear = counterweight._bar(scanner, bare, rng.uniform(-np.pi, np.pi), section).ear
         assert len(hub(replace(bare, ear=ear)).Solids()) == 1
+
+
+@pytest.mark.parametrize(("ring", "instead"), [(None, "a stronger servo"), (CAPSULE, "a ring with a bore")])
+def test_a_rotor_that_its_drive_cannot_hold_is_balanced_or_refused(ring, instead):
+    rng, outcomes = np.random.default_rng(8), set()
+    for sensor, share in (("LMS111", 0.3), ("UTM-30LX", 3.0)):
+        scanner = scanner_at((0, 90, *rng.uniform(20, 80, 2)), sensor=sensor, servo="MX-64R", slip_ring=ring)
+        linkage = bare_linkage(scanner)
+        torque = torque_nm(scanner, float(np.linalg.norm(estimated_moment(scanner, linkage, neck_corners(linkage, 0)))))
+        stall = 5 * torque * share if ring is None else 50.0
+        weak = replace(scanner, servo=scanner.servo.model_copy(update={"stall_torque_nm": stall, "backlash_deg": 0.0}))
+        beyond = torque > min(drive_of(weak).limits).nm
+        try:
+            assert isinstance(found_for(weak), Counterweight) == beyond
+            outcomes.add(beyond)
+        except BuildError as error:
+            outcomes.add(None)
+            assert beyond and f"take {instead}" in str(error)
+    assert outcomes == {None, False}

@@ -14,6 +14,7 @@ from scanners import GROUND_AHEAD, ROLLING, digest_of, scanner_at
 
 from scanwright.cad.assembly.assembly import link_bodies, rotor_weight
 from scanwright.cad.checks.loads.mechanics import load_checks
+from scanwright.cad.checks.loads.retention import worst_shares
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.direct.cage import BearingCage, stiffness_n_per_m
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, heaviest, supported
@@ -23,7 +24,10 @@ from scanwright.cad.layout.envelope import envelope_of
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.layout.placement import drive_of
+from scanwright.cad.layout.tightening import ALUMINIUM as METAL
+from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, hold_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
+from scanwright.cad.parts.shafts.servo_shaft import on_horn
 from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.catalogue.servo import Servo
@@ -179,6 +183,27 @@ def test_the_bearing_counts_in_the_hash_of_the_parts():
     scanner = scanner_for(*ROLLING)
     other = Bearing.model_validate(scanner.bearings[1].model_dump() | {"width_mm": 9.0})
     assert digest_of(scanner) != digest_of(replace(scanner, bearings=(other,)))
+
+
+@pytest.mark.parametrize(
+    ("servo", "ring"), [("XL430-W250", "UH1256-02-0610-06S"), ("AX-12A", None), ("XC330-M288", None)]
+)
+def test_an_upright_rotor_whose_shock_the_horn_does_not_hold_gets_a_bearing(servo, ring):
+    found = set()
+    for sensor in ("STL27L", "RPLIDAR A1", "LMS111"):
+        scanner = scanner_at((0, 0, 30, 10), sensor=sensor, servo=servo, slip_ring=ring)
+        stack, _ = direct_stack(scanner, envelope_of(scanner.lidar))
+        alone, _ = direct_stack(replace(scanner, bearings=()), envelope_of(scanner.lidar))
+        weight, joint = heaviest(scanner, alone), on_horn(scanner.servo, alone, alone.shaft)
+        centre = np.array([weight.off_axis_m, 0.0, alone.horn / 1000 + weight.lever_m])
+        under, into = (
+            PRINTED if alone.cup_bore else METAL,
+            MOULDED if scanner.servo.horn_kind == "self_tapping" else BOUGHT,
+        )
+        strips = 5 * weight.along_n * worst_shares(joint, centre)[0] > hold_of(joint, under, into).pull_n
+        assert (stack.bearing is not None) >= strips
+        found.add(strips)
+    assert True in found
 
 
 @settings(deadline=None, max_examples=40)
