@@ -20,8 +20,8 @@ NECK_ON_RIM = 1.5  # between the neck and the edge of a cup's rim
 HUB_STEP = 1.0  # by which the hub is wider than the bearing's bore
 HUB_GAP = 10.0  # least height between a ring and the hub
 BUNDLE_GAP = 0.25  # mm between two bundles of leads, and a bundle and its channel's wall
-WASHER_GAP = 0.2  # around a washer
-WASHER_WALL = 1.55  # of the hub below the washers of its cross screws
+WASHER_GAP = 0.25  # around a washer
+WASHER_WALL = 1.5  # of the hub below the washers of its cross screws
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_WALL = 2.2  # of the sleeve between bore and leads
 LEANING = 1.15  # width of a lead across the axis, over its diameter, at its bend outwards
@@ -54,7 +54,7 @@ class CrossScrew:
     @property
     def spigot(self) -> float:
         """Length of the shaft inside the hub."""
-        return self.above_bottom + self.path + 0.05
+        return self.above_bottom + self.path
 
     @property
     def hub_height(self) -> float:

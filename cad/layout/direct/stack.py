@@ -6,7 +6,7 @@ ring's top, all fixed parts around the shaft stay below it: clearance over a tur
 
     z = 0             optical centre
     -h                top of the linkage's hub
-    shoulder          the height of the hub below: all that turns and is wider than the journal is above it
+    shoulder          the hub's height below: all that turns and is wider than the journal is above it
     hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
     leads_low         HUB_GAP, or the height of the bend of its leads, below: the end of the ring's rotor collar
     ring_top          the collar's length below

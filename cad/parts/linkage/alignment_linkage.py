@@ -143,7 +143,10 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
         corners = neck_corners(p, attempt)
         neck = corners @ p.stack.R()
-        fins = [*fan, *fins_of(p.top, p.body, p.cables, neck), *_opened(p, neck)]
+        fins = fins_of(p.top, p.body, p.cables, neck)
+        if p.ears is not None:  # those of the sub-plate lie on them
+            fins = [fin.cut(_ears(p)) for fin in fins]
+        fins = [*fan, *fins, *_opened(p, neck)]
         marked = [*_holes(p), _plate_mark(p, neck), *(slot for tie in p.plate_ties for slot in tie_slots(tie))]
         return Shapes(
             plate=_plate(p).moved(laser),
@@ -194,8 +197,15 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
         plate = plate.fuse(*(tie_lug(tie) for tie in p.plate_ties))
     if p.ears is None:
         return plate
+    return plate.fuse(_ears(p))
+
+
+def _ears(p: AlignmentLinkage) -> cq.Solid:
+    """Return the ears under those of the sub-plate, and the plate between them."""
+    assert p.ears is not None
     (x0, y0, _), (x1, y1, _) = p.ears
-    return plate.fuse(solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, p.top)))
+    low, high = p.top - p.plate, p.top
+    return solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, high))
 
 
 def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:

@@ -3,14 +3,18 @@
 import ast
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from scanners import CAPSULE, GROUND_AHEAD, ROLLING, UPRIGHT, scanner_at
 
 from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.direct.cage import BearingCage
+from scanwright.cad.layout.envelope import HEAVY_G
 from scanwright.cad.layout.placement import drive_of, placement_of
+from scanwright.cad.parts.all_parts import laid_out
 
 CAD = Path(__file__).parents[3] / "cad"
 STEPS = {
@@ -115,3 +119,31 @@ def test_the_numbers_of_a_part_are_those_of_its_kind_or_none():
     direct, belt = drive_of(SCANNERS["bearing"]), drive_of(SCANNERS["belt"])
     assert direct.of(BearingCage).stack is direct.stack and direct.of(BeltStack) is None
     assert belt.of(BeltStack) is belt.stack and belt.of(BearingCage) is None
+
+
+def test_parts_scale_with_the_load():
+    """An invented lidar of any mass, in the case of a known one: parts grow with it, up to that of the UTM-30LX."""
+    rng = np.random.default_rng(3)
+    for lidar in ("STL27L", "UST-10LX", "UTM-30LX"):
+        scanner = scanner_at((0, 0, 0, 40), slip_ring=None, sensor=lidar)
+        masses = [30.0, *sorted(rng.uniform(40, 1000, 8))]
+        places = [
+            placement_of(replace(scanner, lidar=scanner.lidar.model_copy(update={"mass_g": float(mass)})))
+            for mass in masses
+        ]
+        for sizes in (
+            [place.linkage.plate for place in places],
+            [place.linkage.neck_share for place in places],
+            [place.stack.hub_radius for place in places],
+            [place.deck.pad_half for place in places],
+        ):
+            assert sizes == sorted(sizes)
+        heavy = next(place for place, mass in zip(places, masses, strict=True) if mass > HEAVY_G)
+        assert (heavy.linkage.plate, heavy.linkage.neck_share, heavy.deck.back_mm) == (8.0, 1.0, 8.0)
+        assert places[0].linkage.neck_share < 0.85
+
+
+def test_the_inexpensive_scanner_needs_no_sub_plate_and_at_most_twenty_screws():
+    layout = laid_out(scanner_at((0, 0, 0, 50), slip_ring=None, sensor="STL27L", servo="XL430-W250"))
+    assert layout.stack.sub_plate is None and layout.linkage.plate == 4.0
+    assert sum(joint.count for joint in layout.joints) <= 20

@@ -168,7 +168,7 @@ SMALL = {"sensor": "URG-04LX", "servo": "AX-12A"}
         (scanner_for(135, -85, 35, -90, **UST), "too heavy for the horn of MX-64R"),
         (scanner_for(75, 65, -20, 10), "the lidar or its cables"),
         (scanner_for(105, -20, -10, -70, **UST), "near to the deck"),
-        (scanner_for(-45, 60, -11, 0, **UST), "shorter than its screws"),
+        (scanner_for(-45, 80, -11, 0, **UST), "shorter than its screws"),
     ],
 )
 def test_where_there_is_none_the_reason_is_told(scanner, why):
