@@ -256,7 +256,7 @@ def test_what_is_not_verified_is_measured_before_anything_is_printed(made):
 def test_the_time_to_print_is_that_of_the_plates(rows, made):
     masses = {row["part"]: float(row["mass_g"]) for row in rows if row["kind"] == "printed"}
     hours = print_hours(sum(masses.values()), made.scanner.printer)
-    assert hours == pytest.approx(sum(masses.values()) / 1.24 / 20)
+    assert hours == pytest.approx(sum(masses.values()) / 1.24 / 17.5)
     (plastic,) = (row for row in rows if row["kind"] == "material")
     assert plastic["note"].startswith(f"{hours_in_words(hours)} to print with supports")
     assert f"; {sum(masses.values()):.1f} g of parts, 10% more for supports" in plastic["note"]
