@@ -16,7 +16,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from scanwright.cad.assembly.print_settings import print_hours
+from scanwright.cad.assembly.print_settings import hours_in_words, print_hours
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.task.task import load_task
 
@@ -109,7 +109,7 @@ def _hardware_row(folder: Path) -> list[str]:
         f"`{folder.name}`",
         ", ".join(devices),
         f"{loaded.task.motion.mode}, {loaded.task.motion.duration_s:g} s",
-        f"{len(printed)} parts, {mass_g:.0f} g, {print_hours(mass_g, printer):.0f} h",
+        f"{len(printed)} parts, {mass_g:.0f} g, {hours_in_words(print_hours(mass_g, printer))}",
         ", ".join(made) or "none",
         ", ".join(tools) or "none",
         f"{total['low_usd']} to {total['high_usd']}",
