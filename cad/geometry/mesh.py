@@ -55,20 +55,20 @@ class TriMesh:
 
 def mesh_of(solid: cq.Shape, chord_error: float = CHORD_ERROR, chord_angle: float = CHORD_ANGLE) -> TriMesh:
     """Tessellate a solid canonically, within a chord error [mm] and angle [rad]."""
-    return _canonical(*_tessellated(solid, chord_error, chord_angle))
+    return canonical(TriMesh(*_tessellated(solid, chord_error, chord_angle)))
 
 
 def of_manifold(solid: manifold3d.Manifold) -> TriMesh:
-    """Return the canonical mesh of the result of a boolean."""
+    """Return the mesh of the result of a boolean."""
     mesh = solid.to_mesh64()
-    return _canonical(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
+    return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
 
 
-def _canonical(points: Array, triangles: NDArray[np.int64]) -> TriMesh:
-    """Return a mesh with rounded, merged and sorted vertices and faces."""
-    raw = np.round(points, DECIMALS) + 0.0  # no -0.0
+def canonical(mesh: TriMesh) -> TriMesh:
+    """Return the mesh with rounded, merged and sorted vertices and faces."""
+    raw = np.round(mesh.vertices, DECIMALS) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
-    faces = index.reshape(-1)[triangles]
+    faces = index.reshape(-1)[mesh.faces]
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     first = np.argmin(faces, axis=1)

@@ -12,7 +12,7 @@ import manifold3d
 import numpy as np
 import shapely
 
-from scanwright.cad.geometry.mesh import TriMesh, of_manifold
+from scanwright.cad.geometry.mesh import TriMesh, canonical, of_manifold
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
 from scanwright.design.errors import BuildError
@@ -113,7 +113,7 @@ def engrave(
     """
     tools = [_tool(flat, outlines, depth) for flat, outlines in grooves]
     cut = mesh.manifold() - manifold3d.Manifold.batch_boolean(tools, manifold3d.OpType.Add)
-    engraved = of_manifold(cut)
+    engraved = canonical(of_manifold(cut))
     wanted = depth * sum(outline.area for _, outlines in grooves for outline in outlines)
     lost = mesh.volume() - engraved.volume()
     if not engraved.is_closed() or abs(lost - wanted) > VOLUME_ERROR * wanted or len(cut.decompose()) != 1:

@@ -392,7 +392,7 @@ def test_the_frame_chain_names_the_servo_beside_the_axis(made):
     text = urdf_text(made.scanner, drive, bodies, {"servo": [], "rot": []})
     horn = drive.stack.servo_origin()
     (case,) = [station.shape for station in drive.stations if station.name == "servo"]
-    low, high = np.array(case.low), np.array(case.high)
+    low, high = np.array(case)
     centre = (low + high) / 2
     assert sorted(high - low) == pytest.approx([40.2, 41.0, 61.1]) and f"{centre[0] / 1000:.6g}" in text
     assert np.linalg.norm(centre[:2] - horn[:2]) < 20

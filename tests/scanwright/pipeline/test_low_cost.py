@@ -31,7 +31,6 @@ def test_all_that_is_made_is_printed(low_cost):
         "servo_frame": "printed",
         "horn_cup": "printed",
         "alignment_linkage": "printed",
-        "sub_plate": "printed",
     }
 
 
