@@ -3,7 +3,7 @@
 Gmsh meshes linkage, shaft and mount with tetrahedra; lidar, hub's bore, horn and what stands still are rigid bodies.
 The shaft is a body, not a beam, the linkage's mass is where it is, and its screws alone hold the lidar: nothing is
 shared with `cad/statics` but stiffness of horn, cage, belt and bearing seats, masses and materials. One line for each
-folder, exit code 1 if `scanwright check` states a frequency that is off by more than 15 %.
+folder, exit code 1 if `scanwright check` states a frequency that is off by more than it states.
 """
 
 from __future__ import annotations
