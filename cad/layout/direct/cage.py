@@ -156,8 +156,9 @@ def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
     shear = length / (2 * 5 / 6 * G * wall * width)
     rocking = (lever - length / 2) ** 2 * length / (4 * E * wall * width * radius**2 / 2)
     reach, span = radius * math.sqrt(0.5), 2 * radius * math.sqrt(0.5)
-    beyond = reach - max(y for _, y in ears.holes)
-    second_moment = (stack.cage_inner - ears.opening) * 2 * (high - low) ** 3 / 12
+    beyond = max(0.0, reach - max(y for _, y in ears.holes))
+    strip = max(stack.cage_inner - ears.opening, wall)  # an opening as wide as the cage leaves the ring below its legs
+    second_moment = strip * 2 * (high - low) ** 3 / 12
     base = (lever / span) ** 2 * beyond**3 / (3 * E * second_moment)
     return 0.5e3 / (bending + shear + rocking + base)
 

@@ -28,6 +28,7 @@ from scanwright.cad.layout.tightening import ALUMINIUM as METAL
 from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, hold_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
+from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Bearing
 from scanwright.design.catalogue.servo import Servo
@@ -324,6 +325,22 @@ def test_a_cage_of_thicker_wall_is_stiffer():
     stiffness, wider = stiffness_n_per_m(cage.stack, cage.ears), replace(cage.ears, opening=cage.ears.opening + 5)
     assert 1e5 < stiffness < 1e7
     assert stiffness_n_per_m(cage.stack, wider) < stiffness
+
+
+def test_every_cage_resists_its_bearing():
+    """Of every servo: an opening wider than the cage made the stiffness negative, and the frequency NaN."""
+    stiff = {}
+    for servo, lidar in itertools.product(load_catalogue(), ("RPLIDAR S2", "UTM-30LX", "LMS111")):
+        if isinstance(servo, Servo):
+            scanner = scanner_for(0, 90, 58, 7, servo=servo.name, lidar=lidar)
+            for ring in (None, scanner.slip_ring):
+                try:
+                    drive = drive_of(replace(scanner, slip_ring=ring))
+                except BuildError:
+                    continue
+                if (cage := drive.of(BearingCage)) is not None:
+                    stiff[servo.name, lidar, ring is None] = stiffness_n_per_m(cage.stack, cage.ears)
+    assert len(stiff) > 20 and min(stiff.values()) > 1e5 and max(stiff.values()) < 1e7
 
 
 @pytest.mark.parametrize("servo", ["MX-28"])
