@@ -10,6 +10,7 @@ itself, still finds a fault. Exit code 1 if one failed silently.
 from __future__ import annotations
 
 import itertools
+import math
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -130,7 +131,8 @@ def _outcome(scanner: Scanner, refused: Counter[str], failed: Counter[str]) -> t
     failed.update({check.code for check in errors})
     if errors:
         return "loud", "; ".join(check.message for check in errors)
-    faults = list(silent_faults(scanner, assembly))
+    faults = [f"{check.code}: {check.value}" for check in checks if not math.isfinite(check.value or 0.0)]
+    faults += silent_faults(scanner, assembly)
     return ("silent", "; ".join(faults)) if faults else ("passed", "")
 
 
