@@ -9,6 +9,7 @@ itself, still finds a fault. Exit code 1 if one failed silently.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 import sys
@@ -38,22 +39,22 @@ SOLID_MM3 = 1.0  # less than any part
 Products = tuple[str, str, str | None]
 
 
-def members(catalogue: Catalogue) -> list[Products]:
-    """Return every lidar, servo and ring that can be laid out at one attitude at least."""
-
-    def fits(lidar: str, servo: str, ring: str | None) -> bool:
-        for angles in (TILTED, (0.0, 0.0, 0.0, 0.0)):
-            try:
-                laid_out_at(catalogue, angles, lidar, servo, ring)
-            except BuildError:
-                continue
-            return True
-        return False
-
+def drawn(catalogue: Catalogue, rng: np.random.Generator) -> Iterator[Products]:
+    """Yield every lidar, servo and ring that can be laid out at one attitude at least, in a random order, endlessly."""
     lidars, servos, rings = (
         [one.name for one in catalogue if isinstance(one, kind)] for kind in (Lidar, Servo, SlipRing)
     )
-    return [each for each in itertools.product(lidars, servos, [None, *rings]) if fits(*each)]
+    every = list(itertools.product(lidars, servos, [None, *rings]))
+    while True:
+        yield from (every[i] for i in rng.permutation(len(every)) if _fits(catalogue, *every[i]))
+
+
+def _fits(catalogue: Catalogue, lidar: str, servo: str, ring: str | None) -> bool:
+    for angles in (TILTED, (0.0, 0.0, 0.0, 0.0)):
+        with contextlib.suppress(BuildError):
+            laid_out_at(catalogue, angles, lidar, servo, ring)
+            return True
+    return False
 
 
 def random_scanner(catalogue: Catalogue, products: Products, rng: np.random.Generator) -> Scanner:
@@ -95,11 +96,8 @@ def silent_faults(scanner: Scanner, assembly: Assembly) -> Iterator[str]:
 def main(count: int, seed: int = 0) -> None:
     """Print the lines."""
     catalogue, rng = load_catalogue(), np.random.default_rng(seed)
-    known = members(catalogue)
-    print(f"{len(known)} combinations", flush=True)
-    order = [known[i] for _ in range(count // len(known) + 1) for i in rng.permutation(len(known))][:count]
     outcomes, refused, failed = Counter[str](), Counter[str](), Counter[str]()
-    for number, products in enumerate(order, start=1):
+    for number, products in enumerate(itertools.islice(drawn(catalogue, rng), count), start=1):
         scanner = random_scanner(catalogue, products, rng)
         angles = scanner.angles.angles_deg
         at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"

@@ -25,12 +25,6 @@ from scanwright.design.arrays import Array
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.scanner import Scanner
 
-LIDAR_CENTRE_ERROR_MM = 2.0
-"""Error of a lidar's centre of mass from the middle of its box, in any direction: assumed, undocumented.
-
-Motor, mirror and most boards are around its axis; plugs and windows, a tenth of it, are 20 mm off.
-"""
-
 
 @dataclass(frozen=True, slots=True)
 class Assembly:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanwright.cad.layout.hub import Hub
+from scanwright.cad.layout.hub import CROSS_SCREWS, Hub
 from scanwright.cad.layout.placement import drive_of
 from scanwright.design.arrays import Array, Mask
 from scanwright.design.errors import BuildError
@@ -40,7 +40,7 @@ class PartsWorkshop:
     def bound(self, setting_rad: Array) -> SelfOcclusion | Refused:
         """Return the cone that ring, bearing and cage always hide."""
         try:
-            stack = drive_of(at_setting(self.scanner, setting_rad)).stack
+            stack = _highest(at_setting(self.scanner, setting_rad))
         except BuildError as error:
             return Refused(str(error))
         bearings = self.scanner.lidar.bearings_rad()
@@ -64,6 +64,14 @@ class PartsWorkshop:
         if key not in self._made:
             self._made[key] = make_parts(scanner)
         return self._made[key]
+
+
+def _highest(scanner: Scanner) -> Hub:
+    """Return the stack with the largest cross screws: the higher the hub, the less do ring and bearing hide."""
+    try:
+        return drive_of(scanner, CROSS_SCREWS[-1]).stack
+    except BuildError:
+        return drive_of(scanner).stack
 
 
 def triangles_of(assembly: Assembly) -> dict[str, Array]:

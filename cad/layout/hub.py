@@ -62,8 +62,13 @@ class CrossScrew:
         return self.spigot + HUB_ROOF
 
 
-CROSS_M3 = CrossScrew(SCREWS["M3"], 9.0, 0.8, 6.0, 2.8, 3.0)  # ISO 7093; sunk so that two screws do not meet
-CROSS_SCREWS = (CrossScrew(SCREWS["M2.5"], 6.0, 0.5, 4.5, 2.0, 2.0), CROSS_M3)  # ISO 7089; the smallest first
+CROSS_M3 = CrossScrew(SCREWS["M3"], 9.0, 0.8, 6.0, 2.8, 3.0)  # sunk so that two screws do not meet
+CROSS_SCREWS = (  # washers of ISO 7089, then ISO 7093; the smallest first
+    CrossScrew(SCREWS["M2.5"], 6.0, 0.5, 4.5, 2.0, 2.0),
+    CROSS_M3,
+    CrossScrew(SCREWS["M4"], 12.0, 1.0, 7.5, 3.5, 4.0),
+    CrossScrew(SCREWS["M5"], 15.0, 1.2, 9.0, 4.0, 5.0),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,7 +57,7 @@ def network_of(scanner: Scanner) -> Network:
     lidar, ring = scanner.lidar, scanner.slip_ring
     loads = loads_of(scanner)
     branches = [branch_of(number, load) for number, load in enumerate(loads, start=1)]
-    circuits = () if ring is None else _circuits(ring, lidar)
+    circuits = () if ring is None else circuits_of(ring, lidar)
     wires = _wires(scanner, loads, branches, circuits)
     return Network(
         boxes=tuple(_boxes(scanner, loads, branches, circuits)),
@@ -102,7 +102,7 @@ def _nets(lidar: Lidar) -> list[tuple[str, float]]:
     return [*power, *data, *((net, 0.0) for net in _shield(lidar))]
 
 
-def _circuits(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
+def circuits_of(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
     """Return for each net the first circuit that carries its current, of its use if possible; the others are spare."""
     assumed = (Circuits(count=len(_nets(lidar)), amps=UNKNOWN_A, use="any"),)
     rated = [(group.amps, group.use) for group in ring.ways or assumed for _ in range(group.count)]

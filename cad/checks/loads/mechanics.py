@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from scanwright.cad.assembly.assembly import LIDAR_CENTRE_ERROR_MM, Assembly, link_bodies, rotor_of, rotor_weight
+from scanwright.cad.assembly.assembly import Assembly, link_bodies, rotor_of, rotor_weight
 from scanwright.cad.checks.table import at_most, figures, note, rated, tidy, with_error
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.layout.belt.loads import belt_nm_per_rad, belt_pull, carrier_forces
@@ -20,6 +20,7 @@ from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.loads import FAR_MM, RATED_AT_MM, Weight, friction_nm, noise_deg, rated_moment_nm
 from scanwright.cad.layout.names import BEARING, BELT, SERVO, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.cross_screws import LIDAR_CENTRE_ERROR_MM
 from scanwright.cad.layout.rotor.imbalance import backlash_matters, keeps_flank
 from scanwright.cad.layout.tightening import SHOCK_G
 from scanwright.design.findings import Finding, Severity

@@ -111,7 +111,7 @@ def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str
         at, carried_kg = _borne(assembly, cage)
         share = carried_kg / body.mass_kg
         brace = at, -share if shaft in hanging else share
-        bears = f" {'less' if shaft in hanging else 'and'} {share * force:.0f} N by the bearing"
+        bears = f", the bearing {'takes' if shaft in hanging else 'adds'} {share * force:.0f} N at its own height"
     pull, push = worst_shares(joint, body.centre_m, brace)
     margins = {hold.pull_by: hold.pull_n / (force * pull), hold.push_by: hold.push_n / (force * push)}
     first = min(margins, key=margins.__getitem__)

@@ -30,7 +30,7 @@ from scanwright.cad.layout.belt.stack import (
 )
 from scanwright.cad.layout.drive import Bundle, DriveLayout, LeadExit, Mounted, Rod, Station, StatorExit, servo_limit
 from scanwright.cad.layout.envelope import Box, Envelope, box_corners
-from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP
+from scanwright.cad.layout.hub import BEARING_STEP, BUNDLE_GAP, CrossScrew
 from scanwright.cad.layout.joints import triple
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import Thread
@@ -57,9 +57,9 @@ BUILT = (
 )
 
 
-def belt_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
+def belt_drive(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> DriveLayout:
     """Return the drive of a scanner with a capsule ring."""
-    stack, ring = belt_stack(scanner, envelope), scanner.slip_ring
+    stack, ring = belt_stack(scanner, envelope, cross), scanner.slip_ring
     assert ring is not None
     plate, mounted = plate_of(scanner), _mounted(stack, tower_foot_of(scanner.printer, stack))
     return DriveLayout(

@@ -15,7 +15,7 @@ from scanwright.cad.layout.belt.stack import (
     drive_corners,
 )
 from scanwright.cad.layout.envelope import Envelope, hub_height, lidar_pose, rows_of, sub_plate_of
-from scanwright.cad.layout.hub import HUB_WALL
+from scanwright.cad.layout.hub import CROSS_M3, HUB_WALL, CrossScrew
 from scanwright.cad.layout.names import BEARING_TOWER, DRIVE_PULLEY
 from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.products import Bearing, Belt, Printer
@@ -33,13 +33,14 @@ TEETH_LEAST = 80  # a smaller pulley makes more of its run-out
 QUARTERS = (3, 2, 0)  # not 1: there the shelf would hide the index groove at +y
 
 
-def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
-    """Lay out the scanner of a capsule ring.
+def belt_stack(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> BeltStack:
+    """Lay out the scanner of a capsule ring, with cross screws of CROSS_M3 or larger.
 
     Raises:
         BuildError: no bearing or belt of the catalogue fits the capsule, the horn is above the belt, the heads of
             its screws leave no wall, or the lidar would hang upside down.
     """
+    cross = max(cross, CROSS_M3, key=lambda one: one.washer)
     ring, servo, R = scanner.slip_ring, scanner.servo, lidar_pose(scanner)
     assert ring is not None and ring.flange is not None and ring.rotor is not None  # of every capsule
     bore = ring.rotor.diameter_mm + 2 * TUBE_WALL
@@ -47,11 +48,12 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
     belt = _belt(scanner, ring)
     hub = SPIGOT_DIAMETER / 2 + HUB_WALL
     alone = BeltStack(
-        h=hub_height(envelope, R, hub),
+        h=hub_height(envelope, R, hub, cross=cross),
         R_rot_laser=rows_of(R),
         ring_length=ring.length_mm,
         ring_radius=ring.outer_diameter_mm / 2,
         shaft_diameter=SPIGOT_DIAMETER,
+        cross_screw=cross,
         shaft_bore=bore,
         bearing=None,
         sub_plate=None,
@@ -82,7 +84,7 @@ def belt_stack(scanner: Scanner, envelope: Envelope) -> BeltStack:
         )
     stack = replace(alone, belt_teeth=stock[0], centre=centre_of(stock[0], teeth, belt.pitch_mm))
     if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
-        stack = replace(stack, h=hub_height(envelope, R, hub, sub_plate=axis), sub_plate=axis)
+        stack = replace(stack, h=hub_height(envelope, R, hub, sub_plate=axis, cross=cross), sub_plate=axis)
     return replace(stack, quarter=_quarter(scanner, stack, envelope.radius(stack.sub_plate)))
 
 

@@ -7,14 +7,10 @@ aluminium rod of 12. Nuts in slots of its wall hold the hub.
 import math
 
 from scanwright.cad.layout.direct.frame import GRIP, OVER_HEADS, needs_frame
-from scanwright.cad.layout.direct.loads import heaviest
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.envelope import Envelope, hub_height, rows_of
-from scanwright.cad.layout.hub import CROSS_SCREWS, CrossScrew
-from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, Joint
-from scanwright.cad.layout.loads import friction_nm
-from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, HORN_CUP
-from scanwright.cad.layout.tightening import FRICTION, HELD_G, LEAST_MARGIN, PRINTED, hold_of
+from scanwright.cad.layout.hub import CrossScrew
+from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE
 from scanwright.cad.screws import SCREWS, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.servo import Servo
@@ -28,39 +24,8 @@ FLOOR_ON_FOOT = 3.0  # over the foot of a cup on a servo frame
 OVER_BOSS = 2.0  # of the horn: clearance, and a printable floor
 
 
-def cup_stack(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
-    """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3).
-
-    Its cross screws are the smallest that hold the angle.
-    """
-    stacks = [_with_screws(scanner, envelope, R, cross) for cross in CROSS_SCREWS]
-    return next((stack for stack in stacks[:-1] if _holds_angle(scanner, stack)), stacks[-1])
-
-
-def _holds_angle(scanner: Scanner, stack: DirectStack) -> bool:
-    """Return whether the friction of the cross screws holds the heaviest linkage of any angles; as `angle_held`."""
-    cross, weight = stack.cross_screw, heaviest(scanner, stack)
-    joint = Joint(
-        ALIGNMENT_LINKAGE,
-        HORN_CUP,
-        "trap",
-        cross.screw,
-        (),
-        grip_mm=stack.hub_wall - cross.sunk,
-        thread_mm=cross.before_nut,
-        washer_mm=cross.washer,
-    )
-    hold = hold_of(joint, PRINTED, PRINTED)
-    assert hold is not None
-    friction = (
-        FRICTION * math.sqrt(2) * hold.preload_n * stack.shaft_diameter / 2000
-    )  # two screws, square to each other
-    turns = HELD_G * math.hypot(weight.across_n, weight.along_n) * weight.off_axis_m + friction_nm(scanner)[1]
-    return friction >= LEAST_MARGIN * turns
-
-
-def _with_screws(scanner: Scanner, envelope: Envelope, R: Array, cross: CrossScrew) -> DirectStack:
-    """Return the stack with one size of cross screws."""
+def cup_stack(scanner: Scanner, envelope: Envelope, R: Array, cross: CrossScrew) -> DirectStack:
+    """Lay out the stack of one scanner without a ring and a bearing; R is the laser in the rotation frame, (3, 3)."""
     servo, screw, printer = scanner.servo, cross.screw, scanner.printer
     floor = max(FLOOR, servo.horn_boss_height_mm + OVER_BOSS)
     bore = servo.horn_circle_mm + 2 * SCREWS[servo.horn_screw].driver_radius

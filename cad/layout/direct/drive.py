@@ -23,7 +23,7 @@ from scanwright.cad.layout.drive import (
     towards,
 )
 from scanwright.cad.layout.envelope import Envelope, around_axis, box_corners
-from scanwright.cad.layout.hub import BUNDLE_GAP
+from scanwright.cad.layout.hub import BUNDLE_GAP, CrossScrew
 from scanwright.cad.layout.joints import fixing_of
 from scanwright.cad.layout.loads import HORN_TILTS_RAD, trusted_moment_nm
 from scanwright.cad.layout.tie_seat import TieSeat
@@ -84,9 +84,9 @@ def stator_exit(scanner: Scanner, stack: DirectStack, cage: BearingCage | None) 
     return StatorExit(start, 0.0 if cage is None else stack.ring_bottom - cage.low, stiff=cage is not None)
 
 
-def direct_drive(scanner: Scanner, envelope: Envelope) -> DriveLayout:
+def direct_drive(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> DriveLayout:
     """Return the drive of a scanner with a through-bore ring or without a ring."""
-    stack, ears = direct_stack(scanner, envelope)
+    stack, ears = direct_stack(scanner, envelope, cross)
     adapter = adapter_of(scanner, stack)
     cage = None if ears is None else cage_of(scanner, stack, ears)
     framed = next((each for each in (ears, adapter) if each is not None and each.onto == names.SERVO_FRAME), None)

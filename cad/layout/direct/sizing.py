@@ -11,7 +11,7 @@ from scanwright.cad.layout.direct.misalignment import with_waist
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import Envelope, hub_height, hub_wall_mm, lidar_pose, rows_of, sub_plate_of
-from scanwright.cad.layout.hub import CROSS_M3, HUB_GAP, HUB_WALL
+from scanwright.cad.layout.hub import CROSS_M3, HUB_GAP, HUB_WALL, CrossScrew
 from scanwright.cad.layout.names import SERVO_SHAFT
 from scanwright.cad.screws import SCREWS
 from scanwright.design.arrays import Array
@@ -27,7 +27,7 @@ LEAST_BORE = SHAFT_MIN + SHAFT_SLIDES
 COLLAR_WALL, COLLAR_WALL_MIN = 2.4, 1.4  # around the horn's boss; less if the heads next to it are close
 
 
-def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ears | None]:
+def direct_stack(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> tuple[DirectStack, Ears | None]:
     """Lay out the stack of one scanner with its servo on the axis, and the ears of a bearing's cage.
 
     Raises:
@@ -35,7 +35,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
             would hang upside down.
     """
     R = lidar_pose(scanner)
-    stack = _without_sub_plate(scanner, envelope, R)
+    stack = _without_sub_plate(scanner, envelope, R, cross)
     if (axis := sub_plate_of(scanner.lidar, stack)) is not None:
         h = hub_height(envelope, R, stack.hub_radius, stack.rims, axis, stack.cross_screw)
         stack = replace(stack, h=h, sub_plate=axis)
@@ -45,17 +45,21 @@ def direct_stack(scanner: Scanner, envelope: Envelope) -> tuple[DirectStack, Ear
     return with_waist(scanner, stack, ears), ears
 
 
-def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> DirectStack:
-    """Return the stack, a cup if neither ring nor bearing needs a turned shaft."""
-    cup = cup_stack(scanner, envelope, R) if scanner.slip_ring is None else None
+def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array, cross: CrossScrew) -> DirectStack:
+    """Return the stack, a cup if neither ring nor bearing needs a turned shaft.
+
+    Its cross screws are at least CROSS_M3 in a turned shaft.
+    """
+    cup = cup_stack(scanner, envelope, R, cross) if scanner.slip_ring is None else None
     if cup is not None and horn_bears(scanner, cup):
         return cup
+    cross = max(cross, CROSS_M3, key=lambda one: one.washer)
     ring, count = scanner.slip_ring, max(1, len(scanner.lidar.cable_y_mm))
     shaft, length, radius, bore = _ring(scanner)
     flange_radius, flange_thickness, collar_radius, collar_height = _flange(scanner.servo, shaft)
     wall = hub_wall_mm(scanner.lidar, shaft)
     alone = DirectStack(
-        h=hub_height(envelope, R, shaft / 2 + wall, [(radius, CROSS_M3.hub_height + HUB_GAP)]),
+        h=hub_height(envelope, R, shaft / 2 + wall, [(radius, cross.hub_height + HUB_GAP)], cross=cross),
         R_rot_laser=rows_of(R),
         ring_length=length,
         ring_radius=radius,
@@ -65,6 +69,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
         lead_diameter=0.0 if ring is None else ring.leads_mm(count),
         lead_radius=0.0 if ring is None else ring.lead_bend_radius_mm or 0.0,
         shaft_diameter=shaft,
+        cross_screw=cross,
         hub_wall=wall,
         flange_radius=flange_radius,
         flange_thickness=flange_thickness,
@@ -79,7 +84,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     forked = needs_frame(scanner.servo) or bool(fork_holes(scanner.servo, alone))
     # the horn is not rated for the rotor, or only the base of a cage has holes for the adapter of a ring
     if not horn_bears(scanner, alone) or (ring is not None and not forked):
-        h = hub_height(envelope, R, shaft / 2 + HUB_WALL, alone.rims)
+        h = hub_height(envelope, R, shaft / 2 + HUB_WALL, alone.rims, cross=cross)
         alone = replace(alone, h=h, hub_wall=HUB_WALL)  # wider than the bore of a bearing
         try:
             bearing = bearing_for(scanner, alone)
@@ -89,7 +94,7 @@ def _without_sub_plate(scanner: Scanner, envelope: Envelope, R: Array) -> Direct
     if bearing is None:
         return cup or alone
     stack = replace(alone, bearing=bearing)
-    return replace(stack, h=hub_height(envelope, R, stack.hub_radius, stack.rims))
+    return replace(stack, h=hub_height(envelope, R, stack.hub_radius, stack.rims, cross=cross))
 
 
 def _ring(scanner: Scanner) -> tuple[float, float, float, float]:

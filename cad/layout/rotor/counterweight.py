@@ -19,7 +19,7 @@ from scanwright.cad.layout.drive import DriveLayout
 from scanwright.cad.layout.loads import STEEL_G_CM3, friction_nm, tilt_sine
 from scanwright.cad.layout.names import COUNTERWEIGHT
 from scanwright.cad.layout.rotor.free_space import behind_screws, in_box, in_fan, in_hull, swept
-from scanwright.cad.layout.rotor.imbalance import backlash_matters, estimated_moment, keeps_flank, torque_nm
+from scanwright.cad.layout.rotor.imbalance import backlash_matters, keeps_flank, torque_nm
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS
@@ -107,14 +107,15 @@ def counterweight_of(
     linkage: AlignmentLinkage,
     plate_ties: tuple[TieSeat, ...],
     neck: Array,
+    moment: Array,
 ) -> Counterweight | LeftOut:
-    """Return the lightest bar that balances the rotor and fits, or why there is none; neck of shape (n, 3).
+    """Return the lightest bar that balances the rotor and fits, or why there is none.
+
+    `neck` has shape (n, 3), `moment` is that of `estimated_moment`, shape (2,).
 
     Raises:
         BuildError: there is none, and servo or belt cannot hold the rotor.
     """
-    upright = tilt_sine(scanner) < UPRIGHT
-    moment = np.zeros(2) if upright else estimated_moment(scanner, linkage, neck)
     torque, limit = torque_nm(scanner, float(np.linalg.norm(moment))), min(drive.limits)
     free = _FreeSpace(drive, deck, linkage, plate_ties, neck)
     found = _found(scanner, linkage, moment, free, required=torque > limit.nm)

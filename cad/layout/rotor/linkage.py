@@ -22,7 +22,6 @@ from scanwright.cad.layout.envelope import (
     sub_plate_mm,
 )
 from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.joints import round_wall_mm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.layout.tie_seat import TieSeat
 from scanwright.cad.screws import SCREWS, Screw, Thread, passing_hole, thread_in_part
@@ -32,7 +31,6 @@ from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 
-CROSSING = 0.2  # between the end of one cross screw and the thread of the other
 CROSS_AT = tuple(math.radians(azimuth) for azimuth in (45.0, 135.0, 225.0, 315.0))  # tapped holes of every shaft
 CHAMFER = 4.0  # of the plate's corners, without lugs
 NECK_SHARE = 0.6  # least of the neck's width at the plate: the plate extends beyond it
@@ -232,26 +230,3 @@ def _cross_azimuths(normal: Array) -> tuple[float, ...]:
     towards = math.atan2(normal[1], normal[0]) if math.hypot(normal[0], normal[1]) > 1e-6 else 0.0
     middle = round(towards / (math.pi / 2) - 1e-6) * (math.pi / 2)
     return middle - math.pi / 4, middle + math.pi / 4
-
-
-def cross_seat_mm(stack: Hub) -> float:
-    """Return the distance of the cross screws' washers from the axis."""
-    return stack.hub_radius - stack.cross_screw.sunk
-
-
-def cross_floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
-    """Return the distance from the axis at which a cross screw leaves the hub: at the bore, or its flat."""
-    bore, half = (p.stack.shaft_diameter + p.fit) / 2, p.cross_hole / 2
-    flat, out = p.stack.flat + p.fit / 2, math.sin(azimuth)
-    on_flat = (flat - half * abs(math.cos(azimuth))) / out if out > 0 else bore
-    return min(math.sqrt(bore**2 - half**2), on_flat)
-
-
-def cross_thread_mm(p: AlignmentLinkage) -> float:
-    """Return the thread length of a cross screw in the shaft up to the other one, or in a cup up to its nut."""
-    outer, thread = p.stack.shaft_diameter / 2, p.cross_thread
-    if thread is None:
-        return outer - p.stack.cross_screw.screw.nominal / 2 - CROSSING
-    if thread.trap is not None:
-        return p.stack.cross_screw.before_nut
-    return round_wall_mm(p.stack.cup_bore / 2, outer, thread.hole)

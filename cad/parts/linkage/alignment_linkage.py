@@ -21,17 +21,12 @@ from scanwright.cad import outlines, solids
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, around_axis, slot_ends
-from scanwright.cad.layout.joints import Joint, fixing_in, inward_axes, screws
+from scanwright.cad.layout.joints import screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, LIDAR, LIDAR_BODY
 from scanwright.cad.layout.placement import Placement
+from scanwright.cad.layout.rotor.cross_screws import cross_joint
 from scanwright.cad.layout.rotor.free_space import in_hull
-from scanwright.cad.layout.rotor.linkage import (
-    AlignmentLinkage,
-    cross_floor_mm,
-    cross_seat_mm,
-    cross_thread_mm,
-    neck_corners,
-)
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, neck_corners
 from scanwright.cad.parts.linkage.fins import FAR, fins_of
 from scanwright.cad.parts.linkage.linkage_hub import hub, hub_cuts, tie_lug, tie_slots
 from scanwright.cad.parts.linkage.sub_plate import OF_LIDAR, front_mark, lidar_joint
@@ -52,18 +47,7 @@ DRIVER_WALL = 3.0  # a thinner wall next to a driver is removed
 
 def linkage_spec(place: Placement) -> PartSpec:
     """Return the linkage of one scanner; its step is in the spec of its shaft."""
-    p, heads = place.linkage, cross_seat_mm(place.stack)
-    crossed = Joint(  # cap screws through the hub's wall into threads or nuts of the shaft
-        ALIGNMENT_LINKAGE,
-        place.drive.shaft,
-        "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
-        place.stack.cross_screw.screw,
-        inward_axes(p.cross_azimuths, heads, p.stack.cross),
-        grip_mm=heads - min(cross_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
-        thread_mm=cross_thread_mm(p),
-        thread=p.cross_thread,
-        washer_mm=place.stack.cross_screw.washer,
-    )
+    p = place.linkage
     shapes = {"printer.fit_clearance_mm": f"the bore of {ALIGNMENT_LINKAGE}"}
     if p.screw_travel > 0:
         slots = f"the slots of {ALIGNMENT_LINKAGE}, in which a screw may be {p.screw_travel:.2g} mm nearer or farther"
@@ -76,7 +60,10 @@ def linkage_spec(place: Placement) -> PartSpec:
         shapes=shapes,
         angles="laser",
         seat=p.top,
-        joints=(crossed, *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, p.plate)])),
+        joints=(
+            cross_joint(p, place.drive.shaft),
+            *([] if p.ears is not None else [lidar_joint(place, ALIGNMENT_LINKAGE, p.plate)]),
+        ),
         avoid=tuple(_around(place)),
         steps={LIDAR: _lidar_step(p)},
     )

@@ -10,7 +10,8 @@ import numpy as np
 
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.hub import JOURNAL_WALL
-from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear, cross_seat_mm
+from scanwright.cad.layout.rotor.cross_screws import cross_seat_mm
+from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
 from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size

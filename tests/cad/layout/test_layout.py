@@ -15,6 +15,7 @@ from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.envelope import HEAVY_G
 from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.parts.all_parts import laid_out
+from scanwright.design.errors import BuildError
 
 CAD = Path(__file__).parents[3] / "cad"
 STEPS = {
@@ -147,3 +148,9 @@ def test_the_inexpensive_scanner_needs_no_sub_plate_and_at_most_twenty_screws():
     layout = laid_out(scanner_at((0, 0, 0, 50), slip_ring=None, sensor="STL27L", servo="XL430-W250"))
     assert layout.stack.sub_plate is None and layout.linkage.plate == 4.0
     assert sum(joint.count for joint in layout.joints) <= 20
+
+
+def test_a_ring_whose_circuits_do_not_carry_the_lidar_is_refused_before_parts():
+    scanner = scanner_at(UPRIGHT, slip_ring=CAPSULE, servo="XM430-W350", sensor="RPLIDAR A3")  # 2.5 A by 2 A
+    with pytest.raises(BuildError, match=r"RPLIDAR A3 draws up to 2\.5 A by \+, a circuit is rated for 2 A"):
+        placement_of(scanner)

@@ -21,6 +21,7 @@ from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL, bearing_for, he
 from scanwright.cad.layout.direct.misalignment import contributions, offsets_mm, worst_moment_nm
 from scanwright.cad.layout.direct.sizing import direct_stack
 from scanwright.cad.layout.envelope import envelope_of
+from scanwright.cad.layout.hub import CROSS_M3
 from scanwright.cad.layout.loads import Weight
 from scanwright.cad.layout.names import ROTOR_LEAD
 from scanwright.cad.layout.placement import drive_of
@@ -193,8 +194,8 @@ def test_an_upright_rotor_whose_shock_the_horn_does_not_hold_gets_a_bearing(serv
     found = set()
     for sensor in ("STL27L", "RPLIDAR A1", "LMS111"):
         scanner = scanner_at((0, 0, 30, 10), sensor=sensor, servo=servo, slip_ring=ring)
-        stack, _ = direct_stack(scanner, envelope_of(scanner.lidar))
-        alone, _ = direct_stack(replace(scanner, bearings=()), envelope_of(scanner.lidar))
+        stack, _ = direct_stack(scanner, envelope_of(scanner.lidar), CROSS_M3)
+        alone, _ = direct_stack(replace(scanner, bearings=()), envelope_of(scanner.lidar), CROSS_M3)
         weight, joint = heaviest(scanner, alone), on_horn(scanner.servo, alone, alone.shaft)
         centre = np.array([weight.off_axis_m, 0.0, alone.horn / 1000 + weight.lever_m])
         under, into = (
@@ -213,7 +214,7 @@ def test_an_upright_rotor_whose_shock_the_horn_does_not_hold_gets_a_bearing(serv
 def test_a_bearing_changes_the_stack_below_the_shoulder_only(alpha_rot, beta_rot, alpha, beta):
     scanner = scanner_for(alpha_rot, beta_rot, alpha, beta)
     stack = drive_of(scanner).stack
-    alone, _ = direct_stack(replace(scanner, bearings=()), envelope_of(scanner.lidar))
+    alone, _ = direct_stack(replace(scanner, bearings=()), envelope_of(scanner.lidar), CROSS_M3)
     above = [(each.h, each.shoulder, each.cross, each.spigot_top) for each in (stack, alone)]
     # where its hub, as wide as the bearing, covers a screw, a plate is put between, which a narrow hub does without
     assert above[0] == above[1] or (stack.sub_plate is not None and alone.sub_plate is None and stack.h > alone.h)

@@ -27,6 +27,7 @@ from scanwright.cad.layout.envelope import (
     screw_travel_mm,
     slot_ends,
 )
+from scanwright.cad.layout.hub import CROSS_M3
 from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.parts.linkage.alignment_linkage import alignment_linkage
 from scanwright.cad.parts.linkage.sub_plate import sub_plate
@@ -203,7 +204,7 @@ def test_a_mount_for_any_axis(alpha_rot, beta_rot):
 def test_a_capsule_ring_has_no_place_on_a_shaft():
     capsule = load_catalogue().get("SRC022A-6", SlipRing)
     with pytest.raises(BuildError, match=r"bore_mm = 0: .*stator of a capsule"):
-        direct_stack(replace(scanner_for(0, 0), slip_ring=capsule), envelope_of(scanner_for(0, 0).lidar))
+        direct_stack(replace(scanner_for(0, 0), slip_ring=capsule), envelope_of(scanner_for(0, 0).lidar), CROSS_M3)
 
 
 def test_a_bore_too_small_for_a_shaft_is_refused():
