@@ -67,7 +67,6 @@ CROSS_SCREWS = (  # washers of ISO 7089, then ISO 7093; the smallest first
     CrossScrew(SCREWS["M2.5"], 6.0, 0.5, 4.5, 2.0, 2.0),
     CROSS_M3,
     CrossScrew(SCREWS["M4"], 12.0, 1.0, 7.5, 3.5, 4.0),
-    CrossScrew(SCREWS["M5"], 15.0, 1.2, 9.0, 4.0, 5.0),
 )
 
 

@@ -6,7 +6,7 @@ They press the hub's bore onto the shaft with the preload that creep leaves; fri
 import math
 
 from scanwright.cad.layout.hub import Hub
-from scanwright.cad.layout.joints import Joint, fixing_in, inward_axes, round_wall_mm
+from scanwright.cad.layout.joints import LENGTHS, THREAD_FREE, Joint, fixing_in, inward_axes, round_wall_mm
 from scanwright.cad.layout.loads import friction_nm
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage
@@ -16,6 +16,7 @@ from scanwright.design.frames import STANDARD_GRAVITY_M_S2
 from scanwright.design.scanner import Scanner
 
 SQUARE = math.sqrt(2.0)  # force of two screws, square to each other, over that of one
+LEAST_ENGAGED = 0.5  # diameters of thread in a shaft, which then carries the preload by the washer
 CROSSING = 0.2  # mm between the end of one cross screw and the thread of the other
 LIDAR_CENTRE_ERROR_MM = 2.0
 """Error of a lidar's centre of mass from the middle of its box, in any direction: assumed, undocumented.
@@ -27,14 +28,15 @@ Motor, mirror and most boards are around its axis; plugs and windows, a tenth of
 def cross_joint(p: AlignmentLinkage, shaft: str) -> Joint:
     """Return the cap screws through the hub's wall into threads or nuts of a shaft."""
     cross, heads = p.stack.cross_screw, cross_seat_mm(p.stack)
+    floor = min(_floor_mm(p, azimuth) for azimuth in p.cross_azimuths)
     return Joint(
         ALIGNMENT_LINKAGE,
         shaft,
         "thread" if p.cross_thread is None else fixing_in(p.cross_thread),
         cross.screw,
         inward_axes(p.cross_azimuths, heads, p.stack.cross),
-        grip_mm=heads - min(_floor_mm(p, azimuth) for azimuth in p.cross_azimuths),
-        thread_mm=_thread_mm(p.stack, p.cross_thread),
+        grip_mm=heads - floor,
+        thread_mm=_thread_mm(p.stack, p.cross_thread, floor),
         thread=p.cross_thread,
         washer_mm=cross.washer,
     )
@@ -65,8 +67,15 @@ def slip_deg(p: AlignmentLinkage, joint: Joint) -> float:
 
 
 def cross_seat_mm(stack: Hub) -> float:
-    """Return the distance of the cross screws' washers from the axis."""
-    return stack.hub_radius - stack.cross_screw.sunk
+    """Return the distance of the cross screws' washers from the axis.
+
+    They are sunk further into the hub of a turned shaft if a screw of a standard length would engage too little.
+    """
+    screw, seat = stack.cross_screw.screw, stack.hub_radius - stack.cross_screw.sunk
+    tip = screw.nominal / 2 + CROSSING + THREAD_FREE
+    length = max((n for n in LENGTHS[screw.name] if n + tip <= seat), default=0)
+    engaged = length - (seat - stack.shaft_diameter / 2)
+    return seat if stack.cup_bore > 0 or engaged >= LEAST_ENGAGED * screw.nominal else length + tip
 
 
 def _floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
@@ -77,11 +86,10 @@ def _floor_mm(p: AlignmentLinkage, azimuth: float) -> float:
     return min(math.sqrt(bore**2 - half**2), on_flat)
 
 
-def _thread_mm(stack: Hub, thread: Thread | None) -> float:
+def _thread_mm(stack: Hub, thread: Thread | None, floor: float) -> float:
     """Return the thread length of a cross screw in a turned shaft up to the other one, or in a cup up to its nut."""
-    outer = stack.shaft_diameter / 2
     if thread is None:
-        return outer - stack.cross_screw.screw.nominal / 2 - CROSSING
-    return (
-        round_wall_mm(stack.cup_bore / 2, outer, thread.hole) if thread.trap is None else stack.cross_screw.before_nut
-    )
+        return floor - stack.cross_screw.screw.nominal / 2 - CROSSING
+    if thread.trap is not None:
+        return stack.cross_screw.before_nut
+    return round_wall_mm(stack.cup_bore / 2, stack.shaft_diameter / 2, thread.hole)
