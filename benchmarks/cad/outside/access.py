@@ -27,7 +27,7 @@ def key_blocked(
 ) -> str | None:
     """Return the body between the key and its screw at every angle of the rotor, None if the key reaches it."""
     flats, length = KEYS_MM[screw.written.size_mm]
-    head = 0.0 if screw.written.holds == "grub" else HEADS_MM[screw.written.size_mm][1] + 2 * TIGHT_MM
+    head = STEP_MM + (0.0 if screw.written.holds == "grub" else HEADS_MM[screw.written.size_mm][1])
     rim = flats / np.sqrt(3) * ring(screw.along, RIM_RAYS)
     starts = screw.seat - head * screw.along + np.concatenate([np.zeros((1, 3)), rim])
     moves = screw.written.part in turning
@@ -65,23 +65,24 @@ def collisions(screw: FoundScrew, bodies: Mapping[str, StepBody], there: Collect
     # the tip's last half millimetre is chamfered; the thread is cut into what holds it
     at_shank = np.arange(washer, screw.written.length_mm - 0.5, STEP_MM) + STEP_MM / 2
     for body in rigid(bodies, there):
-        if (free := body.free_radius(screw.seat, screw.along, at_head).min()) < diameter / 2 - TIGHT_MM:
+        if (free := body.free_radius(screw.seat, screw.along, at_head)[0].min()) < diameter / 2 - TIGHT_MM:
             yield f"its head has {free:.2f} of {diameter / 2:g} mm in {body.name}"
         if body.name == screw.written.onto and screw.written.holds in ("nut", "insert"):
             continue  # a device's ear is not bored in its model
         least = screw.written.size_mm / 2 * (0.76 if body.name == screw.written.onto else 1.0)
-        if (free := body.free_radius(screw.seat, screw.along, at_shank).min()) < least - TIGHT_MM:
+        if (free := body.free_radius(screw.seat, screw.along, at_shank)[0].min()) < least - TIGHT_MM:
             yield f"its shank has {free:.2f} of {least:g} mm in {body.name}"
 
 
 def screw_points(screw: FoundScrew) -> Array:
-    """Return points on what stands out of a screw's hole: its head, and its tip; shape (n, 3)."""
+    """Return points on what stands out of a screw's hole: its head, and a tip behind a loose nut; shape (n, 3)."""
     diameter, height = HEADS_MM[screw.written.size_mm]
     if screw.written.holds == "grub":
         diameter, height = screw.written.size_mm, 0.0
     around = ring(screw.along, 72)[None]
     rows = [(diameter / 2, z) for z in np.linspace(-height, 0.0, 20)]
     rows += [(r, -height) for r in np.linspace(0.0, diameter / 2, 8)]
-    rows += [(r, screw.written.length_mm) for r in np.linspace(0.0, screw.written.size_mm / 2, 5)]
+    if screw.written.holds == "nut":
+        rows += [(r, screw.written.length_mm) for r in np.linspace(0.0, screw.written.size_mm / 2, 5)]
     radius, along = np.array(rows).T[:, :, None, None]
     return (screw.seat + along * screw.along + radius * around).reshape(-1, 3)

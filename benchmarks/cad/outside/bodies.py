@@ -58,13 +58,14 @@ class StepBody:
         leaves[rays] = np.einsum("ij,ij->i", self.mesh.face_normals[faces], directions[rays]) > 0
         return distance, leaves
 
-    def free_radius(self, at: Array, along: Array, t: Array) -> Array:
-        """Return the radius about points `at + t along` that the body leaves free [mm]: 0 inside of it."""
+    def free_radius(self, at: Array, along: Array, t: Array) -> tuple[Array, Array]:
+        """Return the least and the largest distance of the body around points `at + t along` [mm]: 0 inside of it."""
         across = ring(along, RAYS)
         starts = np.repeat(at + t[:, None] * along, RAYS, axis=0)
         distance, leaves = self.first_hits(starts, np.tile(across, (len(t), 1)))
         inside = leaves.reshape(-1, RAYS).mean(axis=1) > 0.5
-        return np.where(inside, 0.0, distance.reshape(-1, RAYS).min(axis=1))
+        around = distance.reshape(-1, RAYS)
+        return np.where(inside, 0.0, around.min(axis=1)), np.where(inside, 0.0, around.max(axis=1))
 
 
 def ring(along: Array, count: int) -> Array:

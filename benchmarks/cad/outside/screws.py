@@ -26,6 +26,9 @@ LOOSE_MM = 0.6  # a hole for a screw is wider by at most this: ISO 273 coarse up
 TIGHT_MM = 0.02  # error of the meshes
 
 
+Free = tuple[Array, Array]  # least and largest radius around an axis
+
+
 @dataclass(frozen=True, slots=True)
 class FoundScrew:
     """A screw in the solids.
@@ -51,7 +54,7 @@ class FoundScrew:
     @property
     def rank(self) -> tuple[bool, bool, float]:
         """The better of two candidates is the lower."""
-        return not self.hole_off_mm < COAXIAL_MM, not self.thread_off_mm < COAXIAL_MM, -self.held_mm
+        return not self.thread_off_mm < COAXIAL_MM, not self.hole_off_mm < COAXIAL_MM, -self.held_mm
 
 
 def found_screws(written: WrittenScrews, bodies: Mapping[str, StepBody], deck: Array) -> list[FoundScrew]:
@@ -88,30 +91,37 @@ def _lines(written: WrittenScrews, bodies: Mapping[str, StepBody]) -> Iterator[t
 
 
 def _screws_on(
-    written: WrittenScrews, bodies: Mapping[str, StepBody], deck: Array, at: Array, along: Array, low: float, high: float
+    written: WrittenScrews,
+    bodies: Mapping[str, StepBody],
+    deck: Array,
+    at: Array,
+    along: Array,
+    low: float,
+    high: float,
 ) -> Iterator[FoundScrew]:
     """Yield the best screw of each direction on an axis."""
     t = np.arange(low, high, STEP_MM)
     free = {name: bodies[name].free_radius(at, along, t) for name in (written.part, written.onto) if name in bodies}
     if free:
         yield from _one_way(written, bodies, deck, at, along, t, free)
-        yield from _one_way(written, bodies, deck, at, -along, -t[::-1], {name: of[::-1] for name, of in free.items()})
+        back = {name: (least[::-1], most[::-1]) for name, (least, most) in free.items()}
+        yield from _one_way(written, bodies, deck, at, -along, -t[::-1], back)
 
 
 def _one_way(
     written: WrittenScrews, bodies: Mapping[str, StepBody], deck: Array, at: Array, along: Array, t: Array,
-    free: Mapping[str, Array],
+    free: Mapping[str, Free],
 ) -> Iterator[FoundScrew]:  # fmt: skip
     radius = written.size_mm / 2
     part = written.part if written.part in free else written.onto
     least, most = (0.75 * radius, radius) if written.holds == "grub" else (radius, radius + LOOSE_MM / 2)
     found = []
-    for start, end in _runs(t, (free[part] >= least - TIGHT_MM) & (free[part] <= most + TIGHT_MM)):
+    for start, end in _runs(t, (free[part][0] >= least - TIGHT_MM) & (free[part][0] <= most + TIGHT_MM)):
         place = _held(written, start, end, t, free, deck, at, along)
         if place is None:
             continue
         seat, held = place
-        hole = 2 * float(free[part][(t >= start) & (t <= end)].min())
+        hole = 2 * float(free[part][0][(t >= start) & (t <= end)].min())
         offs = [_offset(bodies[part], at, along, start, end)]
         offs.append(_offset(bodies[written.onto], at, along, start, end + written.length_mm) if written.onto in bodies
                     else 0.0)  # fmt: skip
@@ -120,13 +130,14 @@ def _one_way(
 
 
 def _held(
-    written: WrittenScrews, start: float, end: float, t: Array, free: Mapping[str, Array], deck: Array,
+    written: WrittenScrews, start: float, end: float, t: Array, free: Mapping[str, Free], deck: Array,
     at: Array, along: Array,
 ) -> tuple[float, float] | None:  # fmt: skip
     """Return the place of a screw's seat along its axis, and the length of thread that holds it."""
     radius, nut = written.size_mm / 2, NUTS_MM[written.size_mm]
     if written.holds == "grub":
-        return start, min(end - start, written.length_mm)
+        meets = free[written.onto][0][(t > end) & (t < end + BEYOND_MM)]
+        return (start, min(end - start, written.length_mm)) if (meets == 0.0).any() else None
     face = float((deck[0] - at) @ along)
     if "deck" in (written.part, written.onto):
         if abs(float(deck[1] @ along)) < 0.999 or (deck[1] @ along > 0) != (written.part == "deck"):
@@ -137,11 +148,11 @@ def _held(
     tip = seat + written.length_mm
     if written.onto == "deck":
         return (seat, min(nut, tip - face - DECK_MM)) if abs(end - face) < 0.5 else None
-    other = free[written.onto]
+    other, widest = free[written.onto]
     if written.holds in ("thread", "insert"):
         low, high = (0.76, 1.03) if written.holds == "thread" else (1.05, 1.6)
         beyond = (t > end - STEP_MM) & (t < tip)
-        run = _runs(t, beyond & (other >= low * radius) & (other <= high * radius + TIGHT_MM))
+        run = _runs(t, beyond & (other >= low * radius) & (widest <= high * radius + 2 * TIGHT_MM))
         length = sum(b - a for a, b in run)
         return (seat, min(length, INSERT_MM) if written.holds == "insert" else length) if run else None
     beyond = (t > end - STEP_MM) & (t < tip)
