@@ -8,8 +8,8 @@ from typing import Literal
 import cadquery as cq
 
 from scanwright.cad.layout.cables.obstacles import Shape
-from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.direct.loads import ALUMINIUM
+from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
 from scanwright.design.catalogue.product_base import Product
 from scanwright.design.catalogue.products import Bearing, Printer

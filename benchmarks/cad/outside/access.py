@@ -65,13 +65,18 @@ def collisions(screw: FoundScrew, bodies: Mapping[str, StepBody], there: Collect
     # the tip's last half millimetre is chamfered; the thread is cut into what holds it
     at_shank = np.arange(washer, screw.written.length_mm - 0.5, STEP_MM) + STEP_MM / 2
     for body in rigid(bodies, there):
-        if (free := body.free_radius(screw.seat, screw.along, at_head)[0].min()) < diameter / 2 - TIGHT_MM:
+        if (free := _least(body, screw, at_head)) < diameter / 2 - TIGHT_MM:
             yield f"its head has {free:.2f} of {diameter / 2:g} mm in {body.name}"
         if body.name == screw.written.onto and screw.written.holds in ("nut", "insert"):
             continue  # a device's ear is not bored in its model
         least = screw.written.size_mm / 2 * (0.76 if body.name == screw.written.onto else 1.0)
-        if (free := body.free_radius(screw.seat, screw.along, at_shank)[0].min()) < least - TIGHT_MM:
+        if (free := _least(body, screw, at_shank)) < least - TIGHT_MM:
             yield f"its shank has {free:.2f} of {least:g} mm in {body.name}"
+
+
+def _least(body: StepBody, screw: FoundScrew, t: Array) -> float:
+    """Return the third least radius that a body leaves: rays in one of its faces hit anything."""
+    return float(np.partition(body.free_radius(screw.seat, screw.along, t)[0], 2)[2])
 
 
 def screw_points(screw: FoundScrew) -> Array:

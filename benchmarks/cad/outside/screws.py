@@ -21,6 +21,7 @@ INSERT_MM = 5.7  # length of the usual insert for M3
 STEP_MM = 0.05
 BEYOND_MM = 6.0  # that is looked at beyond both ends of a screw
 COAXIAL_MM = 0.1
+HEXAGON = 1.05  # its corners are further out than its flats by more than this share
 NARROW_MM = 5.0  # radius of holes and pockets of screws, at most
 LOOSE_MM = 0.6  # a hole for a screw is wider by at most this: ISO 273 coarse up to M5, rounded up
 TIGHT_MM = 0.02  # error of the meshes
@@ -157,7 +158,7 @@ def _held(
         return (seat, min(length, INSERT_MM) if written.holds == "insert" else length) if run else None
     beyond = (t > end - STEP_MM) & (t < tip)
     if written.holds == "trap" or written.part == "deck":
-        pocket = _runs(t, beyond & (other > 1.4 * radius) & (other < 2.6 * radius))
+        pocket = _runs(t, beyond & (other > 1.4 * radius) & (other < 2.6 * radius) & (widest > HEXAGON * other))
         return (seat, min(nut, tip - pocket[0][0])) if pocket else None
     if not np.isfinite(other[beyond]).any():
         return None
