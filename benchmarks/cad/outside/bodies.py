@@ -116,6 +116,6 @@ def mesh_of(file: Path) -> Any:
     import trimesh
 
     loaded = trimesh.load(file)
-    mesh = loaded.to_geometry() if isinstance(loaded, trimesh.Scene) else loaded
+    mesh: Any = loaded.to_geometry() if isinstance(loaded, trimesh.Scene) else loaded
     mesh.merge_vertices()
     return mesh

@@ -10,7 +10,7 @@ STEP = re.compile(r"^## \d+\. (.*)$", re.MULTILINE)
 SCREWS = re.compile(
     r"\*\*(?P<count>\d+) x (?P<number>.+?)(?P<washer> with washers)? "
     r"(?:from (?P<from>\w+) into (?P<into>\w+)"
-    r"|from (?P<lifts>\w+) onto \d+ nuts? \S+ in (?P<trap>\w+)"
+    r"|from (?P<lifts>\w+) onto \d+ nuts? [^,]+ in (?P<trap>\w+)"
     r"|through the (?P<foot>foot) into the deck, with .*?"
     r"|through (?P<through>\w+) into (?P<case>\w+), with \d+ nuts? \S+"
     r"|in (?P<grub>\w+), against (?P<against>\w+))"
@@ -58,8 +58,14 @@ class WrittenStep:
 
 
 def steps_of(text: str) -> list[WrittenStep]:
-    """Read the steps of an `assembly.md`."""
+    """Read the steps of an `assembly.md`.
+
+    Raises:
+        ValueError: a sentence about screws is not understood.
+    """
     pieces = STEP.split(text)[1:]
+    if unread := [words for words in re.findall(r"\*\*\d+ x [^*]*\*\*", text) if not SCREWS.fullmatch(words)]:
+        raise ValueError(f"assembly.md: not understood: {unread}")
     return [
         _step(number, title, words)
         for number, (title, words) in enumerate(zip(pieces[::2], pieces[1::2], strict=True), start=1)
