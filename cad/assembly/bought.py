@@ -125,9 +125,9 @@ def servo_case(servo: Servo, z: float) -> cq.Solid:
     (x0, y0, z0), (x1, y1, z1) = servo.case_min_mm, servo.case_max_mm
     recesses = [solids.upright(EAR_RECESS, z + servo.front.z_mm, z + z1 + 1.0, *hole) for hole in servo.front.places]
     recesses += [solids.upright(EAR_RECESS, z + z0 - 1.0, z + servo.rear.z_mm, *hole) for hole in servo.rear.places]
-    if servo.horn_thickness_mm > -z1:
+    if (depth := _horn_depth(servo)) > -z1:
         around = servo.horn_diameter_mm / 2 + HORN_RECESS
-        recesses.append(solids.upright(around, z - servo.horn_thickness_mm - HORN_RECESS, z + z1 + 1.0))
+        recesses.append(solids.upright(around, z - depth - HORN_RECESS, z + z1 + 1.0))
     for pattern, inwards in ((servo.front, -1.0), (servo.rear, 1.0)):
         if pattern.kind != "through":
             low, high = sorted((z + pattern.z_mm, z + pattern.z_mm + inwards * pattern.depth_mm))
@@ -138,13 +138,18 @@ def servo_case(servo: Servo, z: float) -> cq.Solid:
 
 def servo_horn(servo: Servo, z: float) -> cq.Solid:
     """Return the horn's disc with its threaded holes and boss, its face at height z."""
-    disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - servo.horn_thickness_mm, z)
+    disc: cq.Shape = solids.upright(servo.horn_diameter_mm / 2, z - _horn_depth(servo), z)
     radius = SCREWS[servo.horn_screw].nominal / 2
     low, centres = z - servo.horn_thread_depth_mm, horn_centres(servo)
     disc = disc.cut(*(solids.upright(radius, low, z + 1.0, float(x), float(y)) for x, y in centres))
     if servo.horn_boss_diameter_mm > 0 and servo.horn_boss_height_mm > 0:
         disc = disc.fuse(solids.upright(servo.horn_boss_diameter_mm / 2, z - 0.5, z + servo.horn_boss_height_mm))
     return disc.Solids()[0]
+
+
+def _horn_depth(servo: Servo) -> float:
+    """Return the height of the horn's disc [mm]: one that is thinner than its threads continues in the case."""
+    return max(servo.horn_thickness_mm, servo.horn_thread_depth_mm)
 
 
 def ring_stator(ring: SlipRing, low: float, high: float) -> cq.Solid:

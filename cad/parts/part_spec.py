@@ -8,6 +8,7 @@ from typing import Literal
 import cadquery as cq
 
 from scanwright.cad.layout.cables.obstacles import Shape
+from scanwright.cad.layout.direct.loads import ALUMINIUM
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.layout.loads import ALUMINIUM_G_CM3, STEEL_G_CM3
 from scanwright.design.catalogue.product_base import Product
@@ -149,5 +150,6 @@ class PartSpec:
 
     def density_g_cm3(self, printer: Printer) -> float:
         """Return the density of its material."""
-        densities = {"printed": printer.density_g_cm3, "turned": ALUMINIUM_G_CM3, "sawn": STEEL_G_CM3}
+        turned = ALUMINIUM.density_g_cm3 if self.material == ALUMINIUM.name else ALUMINIUM_G_CM3
+        densities = {"printed": printer.density_g_cm3, "turned": turned, "sawn": STEEL_G_CM3}
         return densities[self.process]

@@ -18,6 +18,7 @@ from scanwright.cad.layout.loads import (
     ALUMINIUM_G_CM3,
     ALUMINIUM_PA,
     METAL_POISSON,
+    STEEL_G_CM3,
     ShaftBend,
     Weight,
     tilt_sine,
@@ -48,6 +49,7 @@ class ShaftMetal:
     modulus_pa: float  # of elasticity
     waist: float  # diameter of the waist in this metal, as a share of that in aluminium
     yields_pa: float  # shear stress at which it yields
+    density_g_cm3: float
 
     def twisted_off_nm(self, waist_diameter: float) -> float:
         """Return the torque at which a waist yields; its diameter is stated for aluminium."""
@@ -55,9 +57,9 @@ class ShaftMetal:
 
 
 # 0.2 % proof stress of 430 MPa (EN 755-2, bars) and 900 MPa (EN ISO 683-2, to 16 mm), by von Mises
-ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6)
+ALUMINIUM = ShaftMetal("aluminium EN AW-7075-T6", ALUMINIUM_PA, 1.0, 0.577 * 430e6, 2.81)
 # as stiff as aluminium: (70 / 206) ** 0.25
-STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.76, 0.577 * 900e6)
+STEEL = ShaftMetal("steel 42CrMo4+QT", 206e9, 0.76, 0.577 * 900e6, STEEL_G_CM3)
 
 
 @dataclass(frozen=True, slots=True)

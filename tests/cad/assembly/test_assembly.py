@@ -6,11 +6,12 @@ import pytest
 from scanners import UPRIGHT, scanner_at
 
 from scanwright.cad.assembly.assembly import as_tree
-from scanwright.cad.assembly.bought import bought_of
+from scanwright.cad.assembly.bought import bought_of, servo_case, servo_horn
 from scanwright.cad.files.step import step_text
 from scanwright.cad.parts.all_parts import laid_out
 from scanwright.design.angles import Angles, AngleSet
 from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.catalogue.servo import Servo
 from scanwright.design.scanner import scanner_of
 
 
@@ -70,3 +71,11 @@ def test_every_body_of_a_lidar_whose_window_reaches_its_top_has_a_mesh():
     bodies = bought_of(laid_out(scanner_of(angles, "sla", load_catalogue())))
     assert all(body.make().Volume() > 0 for body in bodies)
     assert not [body for body in bodies if body.name == "lidar_cap"]
+
+
+@pytest.mark.parametrize("servo", [one for one in load_catalogue() if isinstance(one, Servo)], ids=lambda one: one.name)
+def test_no_screw_in_a_horn_meets_the_case(servo):
+    """The threads of some horns are deeper than the disc in front of the case."""
+    case, horn = servo_case(servo, 0.0), servo_horn(servo, 0.0)
+    assert horn.BoundingBox().zmin <= -servo.horn_thread_depth_mm + 1e-6
+    assert case.intersect(horn).Volume() < 1e-6

@@ -47,6 +47,16 @@ def test_every_made_part_is_listed_once_with_its_mass(rows, made):
     assert len({row["number"] for row in listed.values()}) == len(listed)
 
 
+def test_a_turned_part_weighs_what_its_alloy_does(rows, made):
+    densities = {"7075": 2.81, "6082": 2.70}  # g/cm3
+    notes = {row["part"]: row["note"] for row in rows if row["kind"] == "turned"}
+    assert {"servo_shaft", "journal_sleeve"} <= notes.keys()
+    for part in made.result.parts:
+        if part.name in notes:
+            density = next(value for alloy, value in densities.items() if alloy in notes[part.name])
+            assert part.mass_g == pytest.approx(density * part.volume_mm3 / 1e3, rel=1e-4)
+
+
 def test_prices_are_the_catalogues_and_unknown_ones_stay_empty(rows, made):
     bought = {row["part"]: row for row in rows if row["kind"] == "bought"}
     assert float(bought["lidar"]["unit_usd"]) == made.scanner.lidar.price_usd == 5000

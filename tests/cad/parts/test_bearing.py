@@ -13,6 +13,7 @@ from quick_tests import samples
 from scanners import GROUND_AHEAD, ROLLING, digest_of, scanner_at
 
 from scanwright.cad.assembly.assembly import link_bodies, rotor_weight
+from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.loads.mechanics import load_checks
 from scanwright.cad.checks.loads.retention import worst_shares
 from scanwright.cad.geometry.mesh import checked_mesh
@@ -355,3 +356,10 @@ def test_where_a_fork_finds_no_holes_the_base_of_a_cage_does(servo, beta_rot):
     assert checked_mesh(adapter.make(), adapter.name).is_closed()
     with pytest.raises(BuildError, match=r"slip_ring_adapter: fork: holes"):
         laid_out(replace(scanner, bearings=()))
+
+
+def test_a_base_that_its_opening_cuts_away_is_refused():
+    """The heads of the frame's screws needed a wider opening than the cage: no boss, and 6 screws without a hole."""
+    scanner = scanner_at((29.6, -39.2, -84.4, 0.3), sensor="TiM551", servo="STS3215", slip_ring=None)
+    with pytest.raises(BuildError, match=r"cage_base: boss: opening = 33\.\d mm .* leaves -3\.\d mm of the boss"):
+        make_parts(scanner, lambda spec: spec.name == "cage_base")

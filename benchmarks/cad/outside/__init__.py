@@ -1,0 +1,1 @@
+"""Build folders measured from their files alone; nothing here imports the package."""
