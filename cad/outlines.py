@@ -3,8 +3,12 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from scanwright.design.arrays import Array
+
+HAND, NOTCH = 3.0, 2.0  # radius of corners that hands meet, and of inner corners, where stress is highest
+EDGE_SHARE = 0.45  # of an edge, at most, that the arc at either of its ends takes
 
 
 def diamond(half: float, y: float) -> Array:
@@ -29,3 +33,20 @@ def polygon(radius: float, sides: int, turn: float = 0.0) -> Array:
     """Return a regular polygon with its corners on `radius`, shape (sides, 2), the first one at `turn` [rad]."""
     angle = turn + 2 * math.pi * np.arange(sides) / sides
     return radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def rounded(outline: ArrayLike, radius: ArrayLike) -> Array:
+    """Return first, middle and last point of the arc at each corner, shape (n, 3, 2); without radius, the corner.
+
+    `radius` is one for all corners or one for each; an arc takes less than half of the shorter edge next to it.
+    """
+    corners = np.asarray(outline, dtype=float)
+    radii = np.broadcast_to(np.asarray(radius, dtype=float), len(corners))
+    back, on = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
+    lengths = np.linalg.norm([back, on], axis=2)
+    back, on = back / lengths[0, :, None], on / lengths[1, :, None]
+    half = np.arccos(np.clip(np.einsum("ij,ij->i", back, on), -1.0, 1.0)) / 2
+    reach = np.minimum(radii / np.tan(half), EDGE_SHARE * lengths.min(axis=0))[:, None]
+    inwards = (back + on) / np.linalg.norm(back + on, axis=1)[:, None]
+    deep = reach * (1 / np.cos(half) - np.tan(half))[:, None]
+    return np.stack([corners + reach * back, corners + deep * inwards, corners + reach * on], axis=1)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull
 
+from scanwright.cad import outlines
 from scanwright.design.arrays import Array
 from scanwright.design.errors import BuildError
 
@@ -86,11 +87,38 @@ def radial(radius: float, azimuth: float, z: float, start: float = 0.0, length: 
     return cylinder(radius, (start * out[0] + 0.0, start * out[1] + 0.0, z), out, length)  # no -0.0
 
 
-def prism(outline: ArrayLike, z_low: float, z_high: float) -> cq.Solid:
-    """Return a polygon (n, 2) extruded along z."""
-    points = [cq.Vector(float(x), float(y), z_low) for x, y in np.asarray(outline, dtype=float)]
-    wire = cq.Wire.makePolygon(points, close=True)
+def prism(outline: ArrayLike, z_low: float, z_high: float, radius: ArrayLike = 0.0) -> cq.Solid:
+    """Return a polygon (n, 2) extruded along z, its corners rounded by a radius, or by one for each corner."""
+    if not np.any(radius):
+        points = [cq.Vector(float(x), float(y), z_low) for x, y in np.asarray(outline, dtype=float)]
+        wire = cq.Wire.makePolygon(points, close=True)
+    else:
+        arcs = [[cq.Vector(x, y, z_low) for x, y in arc] for arc in outlines.rounded(outline, radius).tolist()]
+        edges = []
+        for (first, middle, last), (after, _, _) in zip(arcs, arcs[1:] + arcs[:1], strict=True):
+            edges += [] if first == last else [cq.Edge.makeThreePointArc(first, middle, last)]
+            edges.append(cq.Edge.makeLine(last, after))
+        wire = cq.Wire.assembleEdges(edges)
     return cq.Solid.extrudeLinear(wire, [], cq.Vector(0, 0, z_high - z_low))
+
+
+def slab(low: Sequence[float], high: Sequence[float], radius: ArrayLike) -> cq.Solid:
+    """Return the box between two corners, its edges along z rounded; radii of each count from `low`, anticlockwise."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    return prism([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], z0, z1, radius)
+
+
+def plate(
+    half_x: float,
+    half_y: float,
+    chamfer: float,
+    z_low: float,
+    z_high: float,
+    radius: float = outlines.HAND,
+    y: float = 0.0,
+) -> cq.Solid:
+    """Return a plate about (0, y): a rectangle with cut corners, all edges along z rounded."""
+    return prism(outlines.octagon(half_x, half_y, chamfer, y), z_low, z_high, radius)
 
 
 def slot(radius: float, first: Sequence[float], last: Sequence[float], z_low: float, z_high: float) -> cq.Shape:

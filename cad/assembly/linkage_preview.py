@@ -19,7 +19,7 @@ def draft_linkage(p: AlignmentLinkage) -> TriMesh:
     """Return the linkage, rotation frame."""
     shapes = shapes_of(p)
     free_space = _together(shapes.free_space)
-    body = (_solid(shapes.plate) + _solid(shapes.neck)) - free_space - _together(shapes.fins)
+    body = _together([shapes.plate, shapes.neck, *shapes.blends]) - free_space - _together(shapes.fins)
     carrying = max(body.decompose(), key=lambda piece: float(piece.volume()))  # the piece that holds the plate
     return of_manifold((carrying + _solid(shapes.hub)) - free_space - _together(shapes.holes))
 

@@ -18,6 +18,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.geometry.blends import foot_blend
 from scanwright.cad.geometry.mesh import checked_mesh
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.envelope import BODY_GAP, EAR_REACH, around_axis, slot_ends
@@ -92,19 +93,19 @@ def _around(place: Placement) -> Iterator[Shape]:
 def alignment_linkage(p: AlignmentLinkage) -> cq.Solid:
     """Make the linkage.
 
-    A sliver between two cuts can open the mesh of a valid solid; further attempts turn the neck a little and widen the
-    paths of drivers. The frame chain does not change.
+    A sliver between two cuts can open the mesh of a valid solid; further attempts leave the blends out, then turn the
+    neck a little and widen the paths of drivers. The frame chain does not change.
 
     Raises:
         BuildError: no attempt gave one valid watertight solid.
     """
     fault = None
-    for attempt in range(RETRIES + 1):
+    for attempt, blended in ((0, True), *((each, False) for each in range(RETRIES + 1))):
         try:
-            return _attempt(p, attempt)
+            return _attempt(p, attempt, blended)
         except BuildError as error:
             fault = fault or error
-    raise BuildError(f"{fault} (after {RETRIES + 1} attempts)")
+    raise BuildError(f"{fault} (after {RETRIES + 2} attempts)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +118,15 @@ class Shapes:
 
     plate: cq.Shape
     neck: cq.Shape
+    blends: list[cq.Shape]  # of neck and plate
     free_space: list[cq.Shape]  # of the lidar, its cables, and the drivers of its screws
     fins: list[cq.Shape]  # the fan, and fins of the neck
     hub: cq.Shape
     holes: list[cq.Shape]  # and marks
 
 
-def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
-    """Return the shapes; `attempt` turns the neck a little, and widens the paths of drivers."""
+def shapes_of(p: AlignmentLinkage, attempt: int = 0, blended: bool = True) -> Shapes:
+    """Return the shapes, with or without blends; `attempt` turns the neck a little, and widens the paths of drivers."""
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", _tilt(p)):
         laser = solids.location(p.stack.R())
         fan = [solids.sector(min(p.half_x, p.half_y), FAR, start, end, *p.fan_z) for start, end in p.fan]
@@ -138,6 +140,7 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         return Shapes(
             plate=_plate(p).moved(laser),
             neck=solids.hull(corners),
+            blends=[solids.hull(each) for each in blends_of(p, corners)] if blended else [],
             free_space=[shape.moved(laser) for shape in (*_lidar_space(p), *_drivers(p, attempt))],
             fins=[shape.moved(laser) for shape in fins],
             hub=hub(p),
@@ -145,10 +148,10 @@ def shapes_of(p: AlignmentLinkage, attempt: int = 0) -> Shapes:
         )
 
 
-def _attempt(p: AlignmentLinkage, attempt: int) -> cq.Solid:
-    tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt)
+def _attempt(p: AlignmentLinkage, attempt: int, blended: bool) -> cq.Solid:
+    tilt, stack, shapes = _tilt(p), p.stack, shapes_of(p, attempt, blended)
     with building(ALIGNMENT_LINKAGE, "plate and neck", "tilt", tilt) as checked:
-        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck))
+        body: cq.Shape = checked(shapes.plate.fuse(shapes.neck, *shapes.blends))
     with building(ALIGNMENT_LINKAGE, "free space of lidar, cables and fan", "tilt", tilt):
         # small loose pieces next to the plate are dropped
         body = _largest(body.cut(*shapes.free_space, *shapes.fins))
@@ -179,7 +182,7 @@ def _lidar_space(p: AlignmentLinkage) -> list[cq.Solid]:
 def _plate(p: AlignmentLinkage) -> cq.Shape:
     """Return the plate with its tabs, and under a sub-plate its ears."""
     low = p.top - p.plate
-    plate: cq.Shape = solids.prism(outlines.octagon(p.half_x, p.half_y, p.chamfer), low, p.top)
+    plate: cq.Shape = solids.plate(p.half_x, p.half_y, p.chamfer, low, p.top)
     if p.plate_ties:
         plate = plate.fuse(*(tie_lug(tie) for tie in p.plate_ties))
     if p.ears is None:
@@ -187,12 +190,20 @@ def _plate(p: AlignmentLinkage) -> cq.Shape:
     return plate.fuse(_ears(p))
 
 
+def blends_of(p: AlignmentLinkage, neck: Array) -> list[Array]:
+    """Return the corners of the blends of a neck (n, 3) with the plate's lower face."""
+    below = p.stack.R() @ np.diag([1.0, -1.0, -1.0])  # the laser frame upside down
+    outline = outlines.octagon(p.half_x, p.half_y, p.chamfer)
+    return [each @ below.T for each in foot_blend(neck @ below, p.plate - p.top, outline)]
+
+
 def _ears(p: AlignmentLinkage) -> cq.Solid:
     """Return the ears under those of the sub-plate, and the plate between them."""
     assert p.ears is not None
     (x0, y0, _), (x1, y1, _) = p.ears
     low, high = p.top - p.plate, p.top
-    return solids.box((x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, high))
+    corners = (x0 + BODY_GAP, y0 + BODY_GAP, low), (x1 - BODY_GAP, y1 - BODY_GAP, high)
+    return solids.slab(*corners, outlines.HAND)
 
 
 def _drivers(p: AlignmentLinkage, attempt: int) -> list[cq.Shape]:

@@ -9,6 +9,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.geometry.blends import BLEND_MM, MIDDLE
 from scanwright.cad.layout.hub import JOURNAL_WALL
 from scanwright.cad.layout.rotor.cross_screws import cross_seat_mm
 from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, Ear
@@ -17,13 +18,22 @@ from scanwright.cad.layout.tie_seat import GROOVE, SLOT_ACROSS, TieSeat
 LEAST_HALF_WIDTH, LEAST_ABOVE = 4.2, 7.0  # of the channel for leads of unknown size
 OVER_LEADS = 1.5  # height of the channel over its leads
 IN_HUB = 0.5  # end of that height, before the slots of a tab
+NECK_FLAT = 0.4  # of a facet of the neck inside its radius, at most
+INSIDE = 1.0  # radius that the bore removes
+TAB_CORNER = 1.5  # radius
 EAR_CORNER = 0.3  # of its half width
 
 
 def hub(p: AlignmentLinkage) -> cq.Shape:
-    """Return the hub with the ear of a counterweight."""
+    """Return the hub with the ear of a counterweight, blended with the neck where that is narrower."""
     stack = p.stack
-    hub: cq.Shape = solids.upright(stack.hub_radius, stack.shoulder, -stack.h)
+    outer, neck, high = stack.hub_radius, stack.neck_radius, -stack.h
+    hub: cq.Shape = solids.upright(outer, stack.shoulder, high)
+    if outer - neck > BLEND_MM:
+        edge = MIDDLE * BLEND_MM
+        ring = [(outer, stack.shoulder), (outer, high), (neck + BLEND_MM, high), (neck + edge, high + edge)]
+        ring.append((neck - NECK_FLAT, high + BLEND_MM + NECK_FLAT))
+        hub = solids.lathe([(INSIDE, stack.shoulder), *ring, (INSIDE, high + BLEND_MM + NECK_FLAT)])
     if p.ear is not None:
         hub = hub.fuse(_ear(p.ear, (stack.shaft_diameter / 2 + stack.hub_radius) / 2))
     if p.hub_tie is not None:
@@ -40,7 +50,8 @@ def hub_cuts(p: AlignmentLinkage) -> list[cq.Shape]:
 def tie_lug(seat: TieSeat) -> cq.Shape:
     """Return the tab of a cable tie, in the frame of its seat."""
     low = (seat.inner, seat.aside - seat.half_width, seat.low)
-    return solids.box(low, (seat.end, seat.aside + seat.half_width, seat.high)).moved(solids.about_axis(seat.azimuth))
+    high = (seat.end, seat.aside + seat.half_width, seat.high)
+    return solids.slab(low, high, (0.0, TAB_CORNER, TAB_CORNER, 0.0)).moved(solids.about_axis(seat.azimuth))
 
 
 def tie_slots(seat: TieSeat) -> list[cq.Shape]:
@@ -64,7 +75,7 @@ def _ear(ear: Ear, start: float) -> cq.Shape:
     corner = EAR_CORNER * ear.half_width
     middle = np.array([(ear.end + start) / 2, 0.0])
     outline = outlines.octagon(ear.end - middle[0], ear.half_width, corner) + middle
-    return solids.prism(outline, ear.low, ear.high).moved(solids.about_axis(ear.azimuth))
+    return solids.prism(outline, ear.low, ear.high, outlines.HAND).moved(solids.about_axis(ear.azimuth))
 
 
 def _ear_slots(p: AlignmentLinkage) -> list[cq.Shape]:

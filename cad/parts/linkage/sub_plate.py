@@ -10,7 +10,7 @@ from functools import partial
 import cadquery as cq
 import numpy as np
 
-from scanwright.cad import outlines, solids
+from scanwright.cad import solids
 from scanwright.cad.layout.envelope import (
     EAR_REACH,
     EAR_SCREW,
@@ -118,8 +118,8 @@ def sub_plate(scanner: Scanner, stack: Hub, axis: Axis) -> cq.Solid:
     screw, ear_hole = SCREWS[next(iter(lidar.held.values())).screw], passing_hole(EAR_SCREW, printer) / 2
     hole = passing_hole(screw, printer) / 2
     with building(SUB_PLATE, "plate and holes", "ears along", axis) as checked:
-        body: cq.Shape = solids.prism(outlines.octagon(half_x, half_y, CHAMFER), low, high)
-        body = body.fuse(solids.prism(outlines.octagon(*ear_corner(lidar, axis), CHAMFER), low, high))
+        body: cq.Shape = solids.plate(half_x, half_y, CHAMFER, low, high)
+        body = body.fuse(solids.plate(*ear_corner(lidar, axis), CHAMFER, low, high))
         for wall in walls:
             body = body.fuse(solids.box(*wall.box), solids.box(*wall.root))
         ends = [] if walls else [slot_ends(place, screw_travel_mm(lidar)) for place in lidar.base.places]

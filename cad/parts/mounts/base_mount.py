@@ -15,6 +15,7 @@ import cadquery as cq
 import numpy as np
 
 from scanwright.cad import outlines, solids
+from scanwright.cad.geometry.blends import BLEND_MM, foot_blend, section
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.deck import (
     PLUG_GAP,
@@ -33,6 +34,7 @@ from scanwright.cad.screws import passing_hole
 from scanwright.cad.solids import building
 from scanwright.design.arrays import Array
 from scanwright.design.catalogue.products import Printer
+from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 
 SERVO_STEP = Step(
@@ -119,15 +121,24 @@ def _around(deck: Deck, mounted: Mounted) -> Iterator[Shape]:
 
 
 def base_mount(place: Placement) -> cq.Solid:
-    """Make the mount."""
+    """Make the mount, without its blends if the kernel fails with them."""
+    try:
+        return _mount(place, blended=True)
+    except BuildError:
+        return _mount(place, blended=False)
+
+
+def _mount(place: Placement, blended: bool) -> cq.Solid:
     deck, mounted, printer = place.deck, place.drive.mounted, place.scanner.printer
     hole, deck_hole = passing_hole(mounted.screw, printer) / 2, passing_hole(deck.screw, printer) / 2
     axis = f"({deck.normal[0]:.4f}, {deck.normal[1]:.4f}, {deck.normal[2]:.4f})"
     on_deck = solids.location(deck.rotation(), deck.centre)
     back = deck.back_centre[2]
     with building(BASE_MOUNT, "strut and foot", "deck normal", axis) as checked:
-        foot = solids.prism(outlines.octagon(*deck.foot), 0.0, deck.foot_mm).moved(on_deck)
-        body: cq.Shape = checked(_back_plate(deck).fuse(foot, _strut(deck)))
+        foot = solids.plate(*deck.foot, 0.0, deck.foot_mm, radius=deck.foot[2]).moved(on_deck)
+        strut = _behind(_strut_corners(deck), back - STRUT_BEHIND)
+        blends = [solids.hull(each).moved(on_deck) for each in _foot_blends(deck, strut) if blended]
+        body: cq.Shape = checked(_back_plate(deck).fuse(foot, solids.hull(strut), *blends))
     with building(BASE_MOUNT, "rails and screw holes", "deck normal", axis) as checked:
         rails = [_rail(deck, mounted, printer, side) for side in (1.0, -1.0)]
         feet = [solids.upright(FOOT_RADIUS, mounted.rear - 1.0, mounted.ears, x, y) for x, y in mounted.holes]
@@ -146,13 +157,20 @@ def base_mount(place: Placement) -> cq.Solid:
 def _back_plate(deck: Deck) -> cq.Solid:
     x, y = deck.back_half
     _, cy, cz = deck.back_centre
-    return solids.prism(outlines.octagon(x, y, 3.0, cy), cz - deck.back_mm, cz)
+    return solids.plate(x, y, 3.0, cz - deck.back_mm, cz, y=cy)
 
 
-def _strut(deck: Deck) -> cq.Shape:
-    """Return the hull of back plate and a pad in the foot, behind the front of the back plate."""
-    high = deck.back_centre[2] - STRUT_BEHIND
-    return solids.hull(_strut_corners(deck)).cut(solids.box((-400.0, -400.0, high), (400.0, 400.0, high + 400.0)))
+def _behind(corners: Array, front: float) -> Array:
+    """Return the corners (n, 3) of the part of a convex body below a height."""
+    return np.concatenate([corners[corners[:, 2] < front], section(corners, front)])
+
+
+def _foot_blends(deck: Deck, strut: Array) -> list[Array]:
+    """Return the corners of the blends of strut and foot, clear of the heads on the deck; frame of the deck."""
+    aside = min(max(abs(x), abs(y)) for x, y in deck.deck_holes)
+    free = aside - deck.screw.driver_radius - deck.pad_half
+    on_deck = (strut - np.array(deck.centre)) @ deck.rotation()
+    return foot_blend(on_deck, deck.foot_mm, outlines.octagon(*deck.foot), min(BLEND_MM, free))
 
 
 def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Solid:
@@ -161,7 +179,7 @@ def _rail(deck: Deck, mounted: Mounted, printer: Printer, side: float) -> cq.Sol
     y = deck.back_half[1] - RAIL_INSET
     half = max(RAIL_HALF_WIDTH, mounted.screw.driver_radius + rail_wall(printer))
     low = (x - half, cy - y, cz - deck.back_mm / 2)
-    return solids.box(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP))
+    return solids.slab(low, (x + half, cy + y, cz + PLUG_GAP - SEAT_GAP), outlines.HAND)
 
 
 def _strut_corners(deck: Deck) -> Array:

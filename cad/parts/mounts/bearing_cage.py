@@ -40,7 +40,9 @@ from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 from scanwright.design.errors import BuildError
 
+PLUG_CORNER = 1.0  # radius: plugs have as much clearance
 BELL_GAP = 0.7  # around the bell's foot
+WINDOW_CORNERS = (outlines.NOTCH, outlines.NOTCH, outlines.NOTCH, 1.0, outlines.NOTCH)  # the fourth is the ridge
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
 LEAST_BOSS = 6.0  # thickness of its wall: two diameters of the cage's screws, and an insert
@@ -170,12 +172,13 @@ def cage_base(p: BearingCage) -> cq.Solid:
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
     with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:
         reaches_out = -last > stack.cage_outer + BELL_GAP + 2 * FOOT_RADIUS
-        tail = solids.box((-ears.half_x, last, p.low), (ears.half_x, 0.0, p.high if reaches_out else p.foot))
+        high_edge = (ears.half_x, 0.0, p.high if reaches_out else p.foot)
+        tail = solids.slab((-ears.half_x, last, p.low), high_edge, outlines.HAND)
         around = solids.upright(stack.cage_outer + BELL_GAP, p.foot, p.high + 1.0)
         boss = solids.upright(stack.cage_inner - p.fit / 2, p.low, p.high)
         body = solids.upright(stack.cage_outer, p.low, p.foot).fuse(tail).cut(around).fuse(boss)
         half, reach = p.lead_hole
-        leads = [solids.box((-half, 0.0, p.low - 1.0), (half, reach, p.high + 1.0))] if half else []
+        leads = [solids.slab((-half, 0.0, p.low - 1.0), (half, reach, p.high + 1.0), PLUG_CORNER)] if half else []
         body = checked(body.cut(solids.upright(ears.opening, p.low - 1.0, p.high + 1.0), *leads))
     with building(CAGE_BASE, "feet and screw holes", "holes", ears.holes) as checked:
         feet = [solids.upright(FOOT_RADIUS, seats, p.low + 1.0, x, y) for x, y in ears.holes]
@@ -218,8 +221,8 @@ def _windows(p: BearingCage) -> list[cq.Solid]:
         out = np.array([1.0, 0.0, 0.0]) if k % 2 == 0 else np.array([0.0, 1.0, 0.0])
         out = out if k < 2 else -out
         up = np.array([0.0, 0.0, 1.0])
-        low = p.foot - 1.0 if k % 2 == 0 else p.high + 2.0
+        low = p.foot - 5.0 if k % 2 == 0 else p.high + 2.0
         outline = outlines.gable(WINDOW_HALF_WIDTH, low, p.stack.cage_roof + WINDOWS_REACH)
         frame = np.stack([np.cross(up, out), up, out], axis=1)
-        cuts.append(solids.prism(outline, 0.0, 80.0).moved(solids.location(frame)))
+        cuts.append(solids.prism(outline, 0.0, 80.0, WINDOW_CORNERS).moved(solids.location(frame)))
     return cuts

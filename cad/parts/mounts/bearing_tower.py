@@ -139,7 +139,7 @@ def _inside(stack: BeltStack, fit: float) -> cq.Shape:
 def _foot(stack: BeltStack) -> cq.Shape:
     """Return the square of the mount's screws, on a cone that needs no support upside down."""
     low, high = stack.tower_bottom, stack.tower_bottom + FOOT
-    plate = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), low, high)
+    plate = solids.plate(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER, low, high, FOOT_CHAMFER)
     reach = math.sqrt(2) * FOOT_HALF
     rise = reach - stack.wide_radius
     inner = stack.chamber_radius - 0.5
@@ -152,7 +152,7 @@ def _foot(stack: BeltStack) -> cq.Shape:
             (inner, high + rise),
         ]
     )
-    around = solids.prism(outlines.octagon(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER), high - 1.0, high + rise + 1.0)
+    around = solids.plate(FOOT_HALF, FOOT_HALF, FOOT_CHAMFER, high - 1.0, high + rise + 1.0, FOOT_CHAMFER)
     return plate.fuse(cone.intersect(around))
 
 
@@ -165,8 +165,9 @@ def _shelf(stack: BeltStack) -> cq.Shape:
     end = stack.centre + stack.slot_x + TRAVEL + PLATE_SCREW.driver_radius + 1.0
     back = -stack.tower_radius
     outline = [[-MARKED, low], [end, low], [end, high], [-MARKED, high], [back, 12.0], [back, -12.0]]
-    shelf = solids.prism(outline, bottom, top)
-    return shelf.cut(solids.box((root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)))
+    shelf = solids.prism(outline, bottom, top, outlines.HAND)
+    low_edge, high_edge = (root, inner_low, bottom - 1.0), (end + 1.0, inner_high, top + 1.0)
+    return shelf.cut(solids.slab(low_edge, high_edge, (outlines.NOTCH, 0.0, 0.0, outlines.NOTCH)))
 
 
 def _corner_slot(trap: Trap, floor: float, azimuth: float) -> cq.Solid:

@@ -9,7 +9,7 @@ from functools import partial
 
 import cadquery as cq
 
-from scanwright.cad import outlines, solids
+from scanwright.cad import solids
 from scanwright.cad.layout.belt.stack import PLATE, PLATE_GRIP, PLATE_SCREW, SHELF, TRAVEL, BeltStack, shelf_corners
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.drive import Ears
@@ -67,7 +67,7 @@ def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:
     low, high = stack.tower_top, stack.tower_top + PLATE
     y0, y1 = stack.plate_y
     with building(DRIVE_PLATE, "plate and feet", "holes", p.holes) as checked:
-        plate = solids.prism(outlines.octagon(stack.plate_x, (y1 - y0) / 2, 3.0, (y0 + y1) / 2), low, high)
+        plate = solids.plate(stack.plate_x, (y1 - y0) / 2, 3.0, low, high, y=(y0 + y1) / 2)
         feet = [solids.upright(FOOT_RADIUS, seats, low + 1.0, x, y) for x, y in p.holes]
         if p.heel_mm is not None:
             (x0, y0, _), (x1, y1, _) = stack.servo.case_min_mm, stack.servo.case_max_mm

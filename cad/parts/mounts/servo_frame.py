@@ -9,8 +9,9 @@ import math
 from functools import partial
 
 import cadquery as cq
+import numpy as np
 
-from scanwright.cad import solids
+from scanwright.cad import outlines, solids
 from scanwright.cad.layout.cables.obstacles import shape_of
 from scanwright.cad.layout.direct.frame import (
     EAR_DEPTH,
@@ -62,10 +63,10 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
     """Make the frame."""
     (y0, y1), (w0, w1), outer = p.ends_y, p.window_y, p.half_x + p.leg
     with building(SERVO_FRAME, "plate, sides and feet", "holes", p.holes) as checked:
-        body: cq.Shape = solids.box((-outer, y0, p.low), (outer, y1, p.high))
+        body: cq.Shape = solids.slab((-outer, y0, p.low), (outer, y1, p.high), outlines.NOTCH)
         feet = [solids.hull(p.feet_corners(*span)) for span in ((y0, w0), (w1, y1))]
         inside = solids.box((-p.half_x, y0 - 1.0, p.low - 1.0), (p.half_x, y1 + 1.0, p.plate))
-        window = solids.box((-p.reach_x - 1.0, w0, p.low - 1.0), (p.reach_x + 1.0, w1, p.plate - HEADER))
+        window = _window(p)
         body = checked(body.fuse(*feet).cut(inside, window).clean())
     with building(SERVO_FRAME, "opening and holes", "holes", p.holes) as checked:
         cuts: list[cq.Shape] = [solids.upright(p.opening, p.plate - 1.0, p.high + 1.0)]
@@ -80,6 +81,14 @@ def servo_frame(p: ServoFrame) -> cq.Solid:
         if p.ears is not None:
             cuts += _ear_holes(p, p.ears)
         return checked(body.cut(*cuts).clean())
+
+
+def _window(p: ServoFrame) -> cq.Shape:
+    """Return the window through both sides, open below."""
+    (y0, y1), low, high, end = p.window_y, p.low - 1.0, p.plate - HEADER, p.reach_x + 1.0
+    outline = [(y0, low), (y1, low), (y1, high), (y0, high)]
+    along_x = solids.location(np.roll(np.eye(3), -1, axis=1))
+    return solids.prism(outline, -end, end, (0.0, 0.0, outlines.NOTCH, outlines.NOTCH)).moved(along_x)
 
 
 def _ear_holes(p: ServoFrame, ears: Ears) -> list[cq.Solid]:

@@ -14,7 +14,7 @@ from functools import partial
 
 import cadquery as cq
 
-from scanwright.cad import solids
+from scanwright.cad import outlines, solids
 from scanwright.cad.layout.cables.obstacles import Shape, shape_of
 from scanwright.cad.layout.direct.cage import FOOT_RADIUS, SEAT_GAP, UNDER_HEAD, BearingCage
 from scanwright.cad.layout.direct.stack import DirectStack
@@ -39,6 +39,7 @@ OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead
 ARM_GAP = 0.25  # between arm and stator, on the radius
 ARM = 5.0
 ARM_HALF_WIDTH = 10.0
+ARM_CORNERS = (0.0, outlines.NOTCH, outlines.NOTCH, 0.0)  # radii of the one at +x
 UNDER_ROOF = 12.0  # from the arms' ends to the ring's top, under a cage
 PLATE = 6.0
 
@@ -84,8 +85,8 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
     high_end = stack.ring_bottom + min(30.0, stack.ring_length - (5.0 if cage is None else UNDER_ROOF))
     with building(SLIP_RING_ADAPTER, "arms", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
         arms: list[cq.Shape] = [
-            solids.box((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end))
-            for low, high in ((root, outer), (-outer, -root))
+            solids.slab((low, -ARM_HALF_WIDTH, top - 1.0), (high, ARM_HALF_WIDTH, high_end), radii)
+            for low, high, radii in ((root, outer, ARM_CORNERS), (-outer, -root, ARM_CORNERS[2:] + ARM_CORNERS[:2]))
         ]
         drivers = [  # pass the roots of the arms
             solids.upright(ears.screw.driver_radius, top - 2.0, stack.ring_bottom, x, y)
@@ -112,11 +113,13 @@ def _fork(stack: DirectStack, p: Ears, outer: float) -> cq.Shape:
     ys = [y for _, y in p.holes]
     first, last = max(ys) + FOOT_RADIUS + 1.5, min(ys) - FOOT_RADIUS - 1.5
     slot_end = -p.opening - 0.5
+    wider = outlines.HAND if p.half_x > outer else 0.0  # the tail or the prongs have free corners where they meet
     with building(SLIP_RING_ADAPTER, "fork", "holes", p.holes) as checked:
-        tail = solids.box((-p.half_x, last, low), (p.half_x, first, top))
-        prongs = solids.box((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top))
+        tail = solids.slab((-p.half_x, last, low), (p.half_x, first, top), (outlines.HAND, outlines.HAND, wider, wider))
+        corners = (outlines.HAND - wider, outlines.HAND - wider, outlines.NOTCH, outlines.NOTCH)
+        prongs = solids.slab((-outer, min(first, slot_end - 12.0), low), (outer, ARM_HALF_WIDTH, top), corners)
         feet = [solids.upright(FOOT_RADIUS, seats, low + 1.0, x, y) for x, y in p.holes]
-        cuts = [solids.box((-p.opening, slot_end, low - 9), (p.opening, 99.0, top + 9))]
+        cuts = [solids.slab((-p.opening, slot_end, low - 9), (p.opening, 99.0, top + 9), outlines.HAND)]
         for x, y in p.holes:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, top + 1.0, x, y))
             cuts.append(solids.upright(p.screw.driver_radius, low + UNDER_HEAD, top + 1.0, x, y))

@@ -79,7 +79,7 @@ def _joints(deck: Deck, p: TripodFoot) -> Iterator[Joint]:
 def tripod_foot(deck: Deck, p: TripodFoot) -> cq.Solid:
     """Make the plate."""
     with building(TRIPOD_FOOT, "plate and pockets", "deck.screw", deck.screw.name) as checked:
-        plate = solids.prism(outlines.octagon(*deck.foot), -p.thickness, 0.0)
+        plate = solids.plate(*deck.foot, -p.thickness, 0.0, radius=deck.foot[2])
         cuts = [solids.upright(p.tripod.hole / 2, -p.thickness - 1.0, 1.0)]
         if p.tripod.trap is not None:
             cuts.append(solids.prism(outlines.polygon(p.tripod.trap.corner, 6), FLOOR - p.thickness, 1.0))
