@@ -1,4 +1,4 @@
-"""Distance of turning and fixed bodies at every axis angle, and overlap of bodies that move together. Millimetres.
+"""Distance of what turns from what does not, screws included, and overlap of bodies that move together. Millimetres.
 
 A turning body and a fixed one meet at some axis angle if and only if their images (r, z) in the half plane about
 the axis overlap, and the distance of the images is the least distance over a whole turn: no stepping. The image of a
@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from scanwright.cad.assembly.assembly import Assembly
+from scanwright.cad.checks.screw_ends import screw_ends
 from scanwright.cad.checks.table import CLEARANCE_MM, OVERLAP_MM3, at_least, at_most
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.design.arrays import Array
@@ -28,8 +29,9 @@ FAR_MM = 5.0  # distances beyond it are not computed: twelve times the clearance
 def clearance_checks(assembly: Assembly) -> list[Finding]:
     """Return both checks of an assembly."""
     meet = {frozenset({name, body.meets}) for name, body in assembly.bodies.items() if body.meets}
-    turning = assembly.turning()
-    return [turning_check(assembly.outlines(), turning, meet), together_check(assembly.meshes(), turning)]
+    turning, screws = assembly.turning(), screw_ends(assembly, turning=True)
+    bodies = assembly.outlines() | screws | screw_ends(assembly, turning=False)
+    return [turning_check(bodies, turning | screws.keys(), meet), together_check(assembly.meshes(), turning)]
 
 
 def turning_check(

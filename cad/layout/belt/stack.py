@@ -28,6 +28,7 @@ from scanwright.cad import outlines
 from scanwright.cad.layout.drive import Ears, ears_on
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.hub import BEARING_STEP, Hub
+from scanwright.cad.layout.joints import shank_mm
 from scanwright.cad.layout.names import DRIVE_PLATE
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.design.arrays import Array
@@ -57,8 +58,8 @@ SEAT_GAP = 0.2  # the feet carry, not the plate
 INNER_RING = 1.45  # width of a bearing's inner ring that a shoulder may touch
 SEAT_WALL = 5.0  # of the tower
 CHAMBER_GAP = 1.5  # around flange and ring in the tower
-CAPSULE_GAP = 1.5  # between shaft and capsule
-DISC = 10.0  # thickness, of the capsule's holder
+CAPSULE_GAP = 1.5  # between shaft and capsule, and the nuts of its flange and the ring on the shaft
+DISC = 8.0  # thickness, of the capsule's holder
 LEADS = 6.0  # between capsule and mount
 SHELF = 12.0  # thickness of the tower's arms
 PLATE_GRIP = 7.5  # of an arm above the nut of a screw of the plate
@@ -194,7 +195,15 @@ class BeltStack(Hub):
     @property
     def ring_top(self) -> float:
         """Height of the capsule's body towards its rotor."""
-        return self.shaft_bottom - CAPSULE_GAP
+        return self.shaft_bottom - self.capsule_gap
+
+    @property
+    def capsule_gap(self) -> float:
+        """Distance of shaft and capsule, for the nuts on its flange below the ring on the shaft."""
+        grip = DISC + self.flange.thickness_mm
+        over_flange = shank_mm(SCREWS[self.flange.screw], DISC, "nut", self.flange.thickness_mm) - grip
+        below_ring = self.collar_low - self.shaft_bottom + self.flange.below_top_mm
+        return max(CAPSULE_GAP, over_flange + CAPSULE_GAP - below_ring)
 
     @property
     def flange_top(self) -> float:

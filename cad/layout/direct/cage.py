@@ -23,6 +23,7 @@ SEAT_GAP = 0.2  # the feet carry, not the plate
 FOOT_RADIUS = 3.0
 UNDER_HEAD = 3.0  # of the plate
 CAGE_SCREW = SCREWS["M3"]
+LEAST_BOSS = 6.0  # thickness of its wall: two diameters of its screws, and an insert
 SCREW_DEPTH = 10.0  # of a radial screw in the boss
 WINDOW_HALF_WIDTH = 11.5  # the adapter's arms are in the windows at +-x; those at +-y give access to a tie
 TURNS_CLEAR = 1.0  # between the shaft's flange, or the case, and the leads of a ring's stator next to it
@@ -157,7 +158,7 @@ def stiffness_n_per_m(stack: DirectStack, ears: Ears) -> float:
     rocking = (lever - length / 2) ** 2 * length / (4 * E * wall * width * radius**2 / 2)
     reach, span = radius * math.sqrt(0.5), 2 * radius * math.sqrt(0.5)
     beyond = max(0.0, reach - max(y for _, y in ears.holes))
-    strip = max(stack.cage_inner - ears.opening, wall)  # an opening as wide as the cage leaves the ring below its legs
+    strip = stack.cage_inner - ears.opening
     second_moment = strip * 2 * (high - low) ** 3 / 12
     base = (lever / span) ** 2 * beyond**3 / (3 * E * second_moment)
     return 0.5e3 / (bending + shear + rocking + base)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 
-from scanwright.cad.layout.direct.cage import ears_of, fork_holes
+from scanwright.cad.layout.direct.cage import LEAST_BOSS, ears_of, fork_holes
 from scanwright.cad.layout.direct.cup import cup_stack
 from scanwright.cad.layout.direct.frame import needs_frame
 from scanwright.cad.layout.direct.loads import bearing_for, horn_bears
@@ -42,6 +42,7 @@ def direct_stack(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> tup
     if stack.bearing is None:
         return stack, None
     ears = ears_of(scanner, stack)
+    stack = replace(stack, cage_least=ears.opening + LEAST_BOSS)
     return with_waist(scanner, stack, ears), ears
 
 

@@ -75,6 +75,7 @@ class DirectStack(Hub):
     collar_height: float
     waist_length: float  # of the thin piece that bends if horn and bearing are not quite in line
     waist_diameter: float  # in aluminium
+    cage_least: float = 0.0  # inner radius of a bearing's cage, around the boss of its base
     foot_radius: float = 0.0  # of a cup over the screws of a servo frame; else 0
     foot_height: float = 0.0
     grip: float = 0.0  # of such a cup under the heads of the horn's screws; else its flange
@@ -96,8 +97,8 @@ class DirectStack(Hub):
 
     @property
     def cage_inner(self) -> float:
-        """Inner radius of the bearing's cage, around the ring."""
-        return max(self.ring_radius + CAGE_TIE, CAGE_MIN)
+        """Inner radius of the bearing's cage, around the ring and the base's opening."""
+        return max(self.ring_radius + CAGE_TIE, CAGE_MIN, self.cage_least)
 
     @property
     def cage_outer(self) -> float:

@@ -38,14 +38,12 @@ from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step, printed
 from scanwright.cad.screws import Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
-from scanwright.design.errors import BuildError
 
 PLUG_CORNER = 1.0  # radius: plugs have as much clearance
 BELL_GAP = 0.7  # around the bell's foot
 WINDOW_CORNERS = (outlines.NOTCH, outlines.NOTCH, outlines.NOTCH, 1.0, outlines.NOTCH)  # the fourth is the ridge
 UNDER_CAGE_HEAD = 3.5  # of a leg
 TRAP_WALL = 3.0  # of the boss outside a nut
-LEAST_BOSS = 6.0  # thickness of its wall: two diameters of the cage's screws, and an insert
 
 
 def bell_spec(place: Placement) -> PartSpec | None:
@@ -156,18 +154,8 @@ def bearing_cage(p: BearingCage) -> cq.Solid:
 
 
 def cage_base(p: BearingCage) -> cq.Solid:
-    """Make the plate on the servo.
-
-    Raises:
-        BuildError: the opening around horn and heads leaves too little of the boss.
-    """
+    """Make the plate on the servo."""
     stack, ears = p.stack, p.ears
-    if (left := stack.cage_inner - ears.opening) < LEAST_BOSS:
-        raise BuildError(
-            f"{CAGE_BASE}: boss: opening = {ears.opening:.1f} mm around the heads of the {ears.onto}'s screws: leaves "
-            f"{left:.1f} mm of the boss that the cage's screws hold in, it needs {LEAST_BOSS:g}: take a servo with "
-            "holes further from its axis or in its rear only, or a lighter lidar, which needs no bearing"
-        )
     seats = stack.horn + ears.seats
     last = min(y for _, y in ears.holes) - FOOT_RADIUS - 1.5
     with building(CAGE_BASE, "plate and boss", "holes", ears.holes) as checked:

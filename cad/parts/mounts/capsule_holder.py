@@ -20,7 +20,8 @@ from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
 
 BODY_GAP = 0.5  # around the capsule's body
-SOFT_TUBE = "a soft tube, 10 mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
+TUBE_INSIDE = 8.5  # of the soft tube in the shaft
+SOFT_TUBE = "a soft tube, {:.0f} mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
@@ -41,9 +42,11 @@ def holder_spec(place: Placement) -> PartSpec | None:
         return None
     axes = placed_axes(upright_axes(flange_centres(stack.flange), stack.disc_top - DISC, 1.0), stack.turn())
     screw, thickness = SCREWS[stack.flange.screw], stack.flange.thickness_mm
+    tube = TUBE_INSIDE + stack.capsule_gap
+    soft_tube = SOFT_TUBE.format(tube, stack.shaft_bore, stack.rotor.diameter_mm)
     words = (
         "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
-        f"{screws(RING_STATOR)} Leave them so loose that the flange still moves. Push 10 mm of soft tube, "
+        f"{screws(RING_STATOR)} Leave them so loose that the flange still moves. Push {tube:.0f} mm of soft tube, "
         f"{stack.shaft_bore:g} x {stack.rotor.diameter_mm:g} mm, over the stub of the rotor."
     )
     return PartSpec(
@@ -53,7 +56,7 @@ def holder_spec(place: Placement) -> PartSpec | None:
         step=Step("Capsule on its disc", words, "the capsule moves a little by hand, and its rotor turns freely"),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
         joints=(Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness),),
-        rows=(Row("wiring", "soft tube", SOFT_TUBE.format(stack.shaft_bore, stack.rotor.diameter_mm), RUBBER), CRIMPS),
+        rows=(Row("wiring", "soft tube", soft_tube, RUBBER), CRIMPS),
         steps={RING: RING_STEP},
     )
 

@@ -10,10 +10,12 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scanners import CAPSULE, UPRIGHT, scanner_at
 
+from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks import run
 from scanwright.cad.checks.checks_json import checks_text, failure_lines, read_checks
-from scanwright.cad.checks.clearance import together_check, turning_check
+from scanwright.cad.checks.clearance import clearance_checks, together_check, turning_check
 from scanwright.cad.checks.loads import mechanics
 from scanwright.cad.checks.loads.mechanics import load_checks
 from scanwright.cad.checks.printing import islands_check, islands_of, part_checks, thin_walls
@@ -22,6 +24,7 @@ from scanwright.cad.checks.table import at_least, at_most
 from scanwright.cad.geometry.inertia import Inertial
 from scanwright.cad.geometry.mesh import TriMesh, mesh_of
 from scanwright.cad.geometry.print_pose import print_pose
+from scanwright.cad.layout.belt.stack import BeltStack
 from scanwright.cad.layout.placement import drive_of, placement_of
 from scanwright.cad.layout.rotor.imbalance import keeps_flank
 from scanwright.cad.solids import box, location, upright
@@ -368,3 +371,12 @@ def test_check_is_a_command_that_answers_with_its_exit_code(command, tmp_path, m
     assert [entry["where"] for entry in failed] == ["a and b"]
     code, _, complaint = command("check", tmp_path / "nowhere")
     assert (code, len(complaint)) == (2, 1)
+
+
+def test_nuts_of_a_fixed_part_that_meet_one_that_turns_are_an_error(monkeypatch):
+    scanner = scanner_at(UPRIGHT, slip_ring=CAPSULE, servo="XM430-W350", sensor="URG-04LX")
+    assert clearance_checks(make_parts(scanner))[0].severity == "ok"
+    monkeypatch.setattr(BeltStack, "capsule_gap", 1.5)  # the flange's nuts then reach into the ring above them
+    found = clearance_checks(make_parts(scanner))[0]
+    assert found.severity == "error" and found.value == 0.0
+    assert "screws of slip_ring_adapter in ring_stator" in found.message

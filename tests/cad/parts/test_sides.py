@@ -21,6 +21,7 @@ from scanwright.design.errors import BuildError
 from scanwright.design.scanner import scanner_of
 
 NAMES = ("alpha_rot", "beta_rot", "alpha_laser", "beta_laser")
+LIGHT_G = 300.0  # whatever its attitude, the hub's screws hold its angle
 OUTWARDS = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}
 
 
@@ -45,7 +46,7 @@ def with_holes(scanner, sides, size="M4", kind="tapped", z=60.0, off=0.0):
             at = [place, z]
             at.insert(across, OUTWARDS[face][across] * (half[across] - off))
             holes.append(Hole(at_mm=tuple(at), axis=face, kind=kind, size=size, depth_mm=9.0))
-    return replace(scanner, lidar=scanner.lidar.model_copy(update={"holes": tuple(holes)}))
+    return replace(scanner, lidar=scanner.lidar.model_copy(update={"holes": tuple(holes), "mass_g": LIGHT_G}))
 
 
 def held_at(layout):

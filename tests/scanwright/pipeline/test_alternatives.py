@@ -39,7 +39,7 @@ def refused(tmp_path, sensor, **angles):
 
 
 def test_every_servo_and_ring_that_is_named_can_be_laid_out_and_is_strong_enough(tmp_path):
-    loaded, angles = refused(tmp_path, "LMS 200")
+    loaded, angles = refused(tmp_path, "UTM-30LX")
     named = re.split(", or ", what_fits(loaded, angles).split(" with ")[1])
     assert 1 <= len(named) <= 3 and len(set(named)) == len(named)
     for servo, ring in (pair.split(" and ") for pair in named):
