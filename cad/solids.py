@@ -32,7 +32,8 @@ def building(part: str, feature: str, parameter: str, value: object) -> Iterator
     except BuildError:
         raise
     except Exception as error:
-        raise BuildError(f"{step}: the CAD kernel failed: {error}") from error
+        why = f"{type(error).__name__}: {error}".removesuffix(": ")
+        raise BuildError(f"{step}: the CAD kernel failed ({why}); angles a degree away may avoid it") from error
 
 
 def _checked(step: str, shape: cq.Shape) -> cq.Solid:
