@@ -31,14 +31,16 @@ from scanwright.design.electrics.wiring import connectors_of
 OTHER_HOLES = "For a mount with other holes, write them as [deck] in the task and build again."
 ON_DECK = Step(
     "Servo on the deck",
-    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck "
+    "(`template.pdf`). "
     f"{screws(SERVO_CASE, DECK)} Leave space for the plugs. {OTHER_HOLES}",
     "the horn turns freely, and the case is flat on the deck",
     (SERVO,),
 )
 FRAME_ON_DECK = Step(
     "Frame on the deck",
-    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck "
+    "(`template.pdf`). Lay a nut into the slot of each foot, where it cannot turn. "
     f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame. {OTHER_HOLES}",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
@@ -136,7 +138,9 @@ def cables_text(layout: Layout) -> str:
             lines.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
     if not layout.deck.flat:
         lines.append("Close the cable tie in the two slots of the foot around them: it takes the pull off them.")
-    lines.append("Their exits are undocumented: if yours differ, keep the bends and the ties.")
+    else:
+        lines.append("Tape each cable to the deck where it leaves the case: the tape takes the pull off its plug.")
+    lines.append("The exits of these cables are undocumented: if yours differ, keep the bends and the ties or tape.")
     return " ".join(lines)
 
 

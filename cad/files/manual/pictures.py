@@ -16,6 +16,7 @@ from scanwright.cad.assembly.scenes import StepScene
 from scanwright.cad.drawings.dimensions import spread
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.names import DECK, SERVO_CASE
 from scanwright.cad.screws import Screw
 from scanwright.design.arrays import Array, Vector
 from scanwright.design.scene.parallel_view import ParallelView, view_of
@@ -110,8 +111,12 @@ class StepPictures:
         pieces = [self._piece(name, np.zeros(3), GREY) for name in scene.there]
         for sign, shift in shifts.items():
             pieces += [self._piece(name, shift, MADE if name in self._made else BOUGHT) for name in groups[sign]]
-        placed = [(joint, shifts[1.0] if joint.part in scene.comes else np.zeros(3)) for joint, _ in scene.joints]
-        pieces += [Piece(build_scene(body), moved, METAL) for joint, moved in placed for body in _fasteners(joint)]
+        moved_by = {name: shifts[sign] for sign, names in groups.items() for name in names}
+        placed = [(joint, moved_by.get(joint.part, np.zeros(3))) for joint, _ in scene.joints]
+        for joint, moved in placed:
+            pieces += [Piece(build_scene(body), moved, METAL) for body in _screws(joint)]
+            beyond = moved if joint.onto == DECK else moved_by.get(joint.onto, np.zeros(3))
+            pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint)]
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
         yaw, pitch = _side(scene)
         width, height = SIZE_PX
@@ -164,16 +169,22 @@ def _side(scene: StepScene) -> tuple[float, float]:
     return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
 
 
-def _fasteners(joint: Joint) -> list[Array]:
-    """Return triangles of screws and of their loose nuts, before they are put in [m], each of shape (t, 3, 3)."""
-    bodies = []
-    for axis in joint.axes:
-        start, along = np.array(axis.start), np.array(axis.along)
-        bodies.append(_screw(joint, start - _out(joint) * along, along))
-        if joint.fixing in ("nut", "deck"):
-            face = start + (joint.grip_mm + joint.thread_mm + OUT_MM) * along
-            bodies.append(rod(face, along, joint.screw.nut_across / math.sqrt(3), joint.screw.nut_height, 6))
-    return [body / 1000 for body in bodies]
+def _screws(joint: Joint) -> list[Array]:
+    """Return triangles of screws before they are put in [m], each of shape (t, 3, 3)."""
+    axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
+    return [_screw(joint, start - _out(joint) * along, along) / 1000 for start, along in axes]
+
+
+def _nuts(joint: Joint) -> list[Array]:
+    """Return triangles of loose nuts [m], each of shape (t, 3, 3): those of a servo's case in its slots, others off."""
+    if joint.fixing not in ("nut", "deck"):
+        return []
+    size, off = joint.screw, joint.grip_mm + joint.thread_mm + OUT_MM * (joint.onto != SERVO_CASE)
+    axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
+    return [
+        rod(start + off * along, along, size.nut_across / math.sqrt(3), size.nut_height, 6) / 1000
+        for start, along in axes
+    ]
 
 
 def _out(joint: Joint) -> float:
@@ -227,6 +238,14 @@ def _call_out(
 
 def _lines_of(joint: Joint, torque: str) -> tuple[str, ...]:
     """Return a joint in a few short lines."""
+    held = f"{'washers, ' * (joint.washer_mm is not None)}{torque}"
+    if joint.fixing == "trap":
+        return (
+            f"{joint.count} x {joint.number}",
+            held,
+            f"onto {joint.count} nuts {joint.screw.name}",
+            f"in {joint.onto}",
+        )
     nuts = (f"{joint.count} nuts {joint.screw.name}",) if joint.fixing in ("nut", "deck") else ()
     where = "against" if joint.fixing == "grub" else "into"
-    return f"{joint.count} x {joint.number}", torque, f"{where} {joint.onto}", *nuts
+    return f"{joint.count} x {joint.number}", held, f"{where} {joint.onto}", *nuts
