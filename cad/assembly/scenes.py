@@ -116,7 +116,7 @@ def _one(layout: Layout, lead: RotorLead) -> str:
     azimuth = math.degrees(math.atan2(y, x)) % 360.0
     return (
         f"The leads for the cable at y = {lead.y:g} mm leave {layout.drive.leads_leave} at {azimuth:.0f} deg "
-        "(counter-clockwise from above, 90 at the index); the path to the lidar's outlet "
+        "(counter-clockwise from above, 90 at the index groove); the path to the lidar's outlet "
         f"is {lead.path.length():.0f} mm long, with bend radii of {lead.radius:g} mm or more."
     )
 
@@ -136,11 +136,12 @@ def cables_text(layout: Layout) -> str:
             bent = f"{lead.path.length():.0f} mm to there, with bend radii of {lead.radius:g} mm or more"
             runs, stops = ("run", "end") if lead.name.endswith("s") else ("runs", "ends")
             lines.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
-    if not layout.deck.flat:
-        lines.append("Close the cable tie in the two slots of the foot around them: it takes the pull off them.")
-    else:
+    if layout.deck.flat:
         lines.append("Tape each cable to the deck where it leaves the case: the tape takes the pull off its plug.")
-    lines.append("The exits of these cables are undocumented: if yours differ, keep the bends and the ties or tape.")
+    else:
+        lines.append("Close the cable tie in the two slots of the foot around them: it takes the pull off them.")
+    held = "tape" if layout.deck.flat else "tie"
+    lines.append(f"The exits of these cables are undocumented: if yours differ, keep the bends and the {held}.")
     return " ".join(lines)
 
 

@@ -1,7 +1,7 @@
 """The picture of each step: present bodies in grey, new ones in colour before they are moved into place, screws named.
 
 The rotation axis is upright, on the bench the lidar's axis. Of eight sides, from above and below, the view is the one
-that shows the heads of the screws best; without screws it is the first.
+that shows the heads of the screws best, or that shows most of the cables in place; else it is the first.
 """
 
 import io
@@ -23,6 +23,7 @@ from scanwright.design.scene.parallel_view import ParallelView, view_of
 from scanwright.design.scene.ray_caster import Scene, build_scene
 
 SIZE_PX = 720, 480  # pixels, wide and high
+SMALL_PX = 128, 120  # of a picture that only counts what is visible
 WORDS_PX = 210  # of them at the right, for the screws
 TEXT_PX, LINE_PX = 15, 20
 MARGIN = 1.06
@@ -118,8 +119,8 @@ class StepPictures:
             beyond = moved if joint.onto == DECK else moved_by.get(joint.onto, np.zeros(3))
             pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint)]
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
-        yaw, pitch = _side(scene)
         width, height = SIZE_PX
+        yaw, pitch = _side(scene) if np.any(scene.along) else _clearest(scene, corners, pieces)
         view = view_of(corners, (width - WORDS_PX, height), yaw, pitch, MARGIN, scene.R_rot_picture)
         image = Image.new("RGB", SIZE_PX, LIGHT)
         image.paste(painted(view, pieces), (0, 0))
@@ -166,6 +167,19 @@ def _side(scene: StepScene) -> tuple[float, float]:
 
     if not heads:
         return YAWS_RAD[0], PITCHES_RAD[0]
+    return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
+
+
+def _clearest(scene: StepScene, corners: Array, pieces: Sequence[Piece]) -> tuple[float, float]:
+    """Return the yaw and pitch [rad] of the view in which most of the new bodies is visible, preferably from above."""
+
+    def seen(yaw: float, pitch: float) -> float:
+        view = view_of(corners, SMALL_PX, yaw, pitch, MARGIN, scene.R_rot_picture)
+        away = np.stack([view.shown(piece.scene, piece.moved_m).away_m for piece in pieces])
+        new = np.array([piece.colour is not GREY for piece in pieces])
+        pixels = np.isfinite(away.min(axis=0)) & new[away.argmin(axis=0)]
+        return float(pixels.sum()) * view.pixel_m**2 * (1.0 - BELOW * (pitch < 0))
+
     return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
 
 

@@ -68,8 +68,7 @@ def bell_spec(place: Placement) -> PartSpec | None:
         f"seat, press the bearing in, {leads}and lower the cage "
         f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the shaft once "
         "around by hand, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and "
-        "let the "
-        "epoxy set before you load the shaft: it fills the gaps of the print."
+        "let the epoxy set before you load the shaft: it fills the gaps of the print."
     )
     return PartSpec(
         name=BEARING_CAGE,

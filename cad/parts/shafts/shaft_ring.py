@@ -30,9 +30,9 @@ def shaft_ring_spec(place: Placement) -> PartSpec | None:
     azimuths = (math.radians(azimuth) for azimuth in RING_SCREWS_DEG)
     words = (
         "From below push the shaft ring up the shaft, its step against the lower bearing and its holes over the "
-        "threads, so "
-        f"that the shaft has no clearance along the axis and still turns freely. {screws(MAIN_SHAFT)} Screws "
-        "and driver pass the round window in the tower: turn the shaft until each hole is visible there."
+        "threads, so that the shaft has no clearance along the axis and still turns freely. "
+        f"{screws(MAIN_SHAFT)} Screws and driver pass the round window in the tower: turn the shaft until each hole is "
+        "visible there."
     )
     return PartSpec(
         name=SHAFT_RING,
