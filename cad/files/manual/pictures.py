@@ -116,7 +116,7 @@ class StepPictures:
         placed = [(joint, moved_by.get(joint.part, np.zeros(3))) for joint, _ in scene.joints]
         for joint, moved in placed:
             pieces += [Piece(build_scene(body), moved, METAL) for body in _screws(joint)]
-            beyond = moved if joint.onto == DECK else moved_by.get(joint.onto, np.zeros(3))
+            beyond = moved if joint.onto in (DECK, SERVO_CASE) else moved_by.get(joint.onto, np.zeros(3))
             pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint)]
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
         width, height = SIZE_PX
@@ -190,10 +190,10 @@ def _screws(joint: Joint) -> list[Array]:
 
 
 def _nuts(joint: Joint) -> list[Array]:
-    """Return triangles of loose nuts [m], each of shape (t, 3, 3): those of a servo's case in its slots, others off."""
+    """Return triangles of loose nuts off their face [m], each of shape (t, 3, 3)."""
     if joint.fixing not in ("nut", "deck"):
         return []
-    size, off = joint.screw, joint.grip_mm + joint.thread_mm + OUT_MM * (joint.onto != SERVO_CASE)
+    size, off = joint.screw, joint.grip_mm + joint.thread_mm + OUT_MM
     axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
     return [
         rod(start + off * along, along, size.nut_across / math.sqrt(3), size.nut_height, 6) / 1000

@@ -31,8 +31,8 @@ from scanwright.design.catalogue.servo import Servo
 RING_STEP = Step(
     "Slip ring",
     "Pass the plugs of the stator's leads down on the side of the index groove, and lower the slip ring over the "
-    "shaft, its collar upwards. Clamp its collar to the shaft with the set screws that are in it. Turn the stator until "
-    "its leads hang straight, and hold it by a cable tie in the grooves of the adapter: it can move a "
+    "shaft, its collar upwards. Clamp its collar to the shaft with the set screws that are in it. Turn the stator "
+    "until its leads hang straight, and hold it by a cable tie in the grooves of the adapter: it can move a "
     "little, but must not turn.",
     "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )

@@ -112,7 +112,7 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer, foot),
         step=Step("Drive pulley and servo", words, "the belt stays between the rims for a turn by hand"),
-        rows=(Row("tool", "spring scale", "spring scale, 5 N", "assembly.md", "pre-load of the belt"),),
+        rows=(Row("tool", "spring scale", "spring scale", "assembly.md", "0 to 5 N, for the belt"),),
         fits=fits,
         notes=(_teeth_words(stack),),
         axis=stack.horn_axis,
