@@ -19,8 +19,8 @@ from scanwright.design.electrics.wiring import network_of, uart_adapter
 
 NUTS = (
     "Put the nuts into the pockets of {holders} before the step that closes them: those of a plate or an arm from "
-    "below; those of a boss, cup or base from above into the slots; those of a foot from its corners. Pull each in with a "
-    "screw. A hole without a pocket has a plain thread."
+    "below; those of a boss, cup or base from above into the slots; those of a foot from its corners. Pull each in "
+    "with a screw. A hole without a pocket has a plain thread."
 )
 LOCKED = (
     "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
