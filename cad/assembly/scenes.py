@@ -31,14 +31,16 @@ from scanwright.design.electrics.wiring import connectors_of
 OTHER_HOLES = "For a mount with other holes, write them as [deck] in the task and build again."
 ON_DECK = Step(
     "Servo on the deck",
-    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the servo's rear holes into the deck "
+    "(`template.pdf`). "
     f"{screws(SERVO_CASE, DECK)} Leave space for the plugs. {OTHER_HOLES}",
     "the horn turns freely, and the case is flat on the deck",
     (SERVO,),
 )
 FRAME_ON_DECK = Step(
     "Frame on the deck",
-    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck. "
+    "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck "
+    "(`template.pdf`). Lay a nut into the slot of each foot, where it cannot turn. "
     f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame. {OTHER_HOLES}",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
@@ -114,7 +116,7 @@ def _one(layout: Layout, lead: RotorLead) -> str:
     azimuth = math.degrees(math.atan2(y, x)) % 360.0
     return (
         f"The leads for the cable at y = {lead.y:g} mm leave {layout.drive.leads_leave} at {azimuth:.0f} deg "
-        "(counter-clockwise from above, 90 at the index); the path to the lidar's outlet "
+        "(counter-clockwise from above, 90 at the index groove); the path to the lidar's outlet "
         f"is {lead.path.length():.0f} mm long, with bend radii of {lead.radius:g} mm or more."
     )
 
@@ -134,9 +136,12 @@ def cables_text(layout: Layout) -> str:
             bent = f"{lead.path.length():.0f} mm to there, with bend radii of {lead.radius:g} mm or more"
             runs, stops = ("run", "end") if lead.name.endswith("s") else ("runs", "ends")
             lines.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
-    if not layout.deck.flat:
+    if layout.deck.flat:
+        lines.append("Tape each cable to the deck where it leaves the case: the tape takes the pull off its plug.")
+    else:
         lines.append("Close the cable tie in the two slots of the foot around them: it takes the pull off them.")
-    lines.append("Their exits are undocumented: if yours differ, keep the bends and the ties.")
+    held = "tape" if layout.deck.flat else "tie"
+    lines.append(f"The exits of these cables are undocumented: if yours differ, keep the bends and the {held}.")
     return " ".join(lines)
 
 

@@ -253,7 +253,7 @@ def _small_things(assembly: Assembly) -> Iterator[BomItem]:
     yield from (need for need in needs if need.kind != "tool")
     ends, drops = "screws that end in metal or nuts", "a few drops"
     yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
-    sizes = ", ".join(sorted({joint.screw.name for joint in joints}))
+    sizes = ", ".join(sorted({"grub " * (joint.fixing == "grub") + joint.screw.name for joint in joints}))
     yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
     holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
     torques_nm = [hold.torque_nm for hold in holds if hold is not None]

@@ -68,7 +68,7 @@ def to_centre(servo: Servo) -> str:
     counts = 2 ** round(math.log2(servo.position_feedback_deg / servo.position_step_deg))
     centre = f"position {counts // 2} of {counts}"
     return (
-        f"Power the servo on the bench (`wiring.md`, {BENCH}) and turn it to its centre ({centre}) with "
+        f"Power the servo alone (`wiring.md`, {BENCH}) and turn it to its centre ({centre}) with "
         "`scanwright servo-setup PORT --centre`. Then switch it off."
     )
 

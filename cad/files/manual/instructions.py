@@ -11,15 +11,16 @@ from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.drive import products_of
 from scanwright.cad.layout.joints import DECK_MM, Joint
-from scanwright.cad.layout.names import FIT_COUPON, TEST_PLATE
+from scanwright.cad.layout.names import FIT_COUPON, SERVO_CASE, TEST_PLATE
 from scanwright.cad.layout.tightening import hold_of
 from scanwright.design.catalogue.holes import CASE_EAR_MM
 from scanwright.design.catalogue.measuring import WITH_CALIPER, measure_first
 from scanwright.design.electrics.wiring import network_of, uart_adapter
 
 NUTS = (
-    "Put the nuts into their pockets first: those of a plate or an arm from below; those of a boss from above into the "
-    "slots; those of a foot from its corners. Pull each in with a screw. A hole without a pocket has a plain thread."
+    "Put the nuts into the pockets of {holders} before the step that closes them: those of a plate or an arm from "
+    "below; those of a boss, cup or base from above into the slots; those of a foot from its corners. Pull each in "
+    "with a screw. A hole without a pocket has a plain thread."
 )
 LOCKED = (
     "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
@@ -65,8 +66,8 @@ def instructions_text(assembly: Assembly, scenes: Sequence[StepScene], plates: S
     lines += [LOCKED, ""]
     if any(joint.inserts for joint in joints):
         lines += ["Melt the inserts in first, flush with the face on the side of the screw.", ""]
-    if any(joint.traps for joint in joints):
-        lines += [NUTS, ""]
+    if holders := dict.fromkeys(joint.holder for joint in joints if joint.traps):
+        lines += [NUTS.format(holders=" and ".join(holders)), ""]
     for number, scene in enumerate(scenes, start=1):
         lines += [f"## {number}. {scene.step.title}", "", f"![{scene.step.title}]({picture_name(number)})", ""]
         lines += [_words(assembly, scene), ""]
@@ -116,10 +117,11 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     """Return one joint as a sentence, with the torque of its screws."""
     what = f"{joint.count} x {joint.number}{'' if joint.washer_mm is None else ' with washers'}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
+    in_case = " in the slots of the case" if joint.onto == SERVO_CASE else ""
     place = {
         "thread": f"from {joint.part} into {joint.onto}",
         "trap": f"from {joint.part} onto {nuts} in {joint.onto}",
-        "nut": f"through {joint.part} into {joint.onto}, with {nuts}",
+        "nut": f"through {joint.part} into {joint.onto}, with {nuts}{in_case}",
         "deck": f"through the foot into the deck, with {nuts}",
         "grub": f"in {joint.part}, against {joint.onto}",
     }[joint.fixing]

@@ -1,7 +1,7 @@
 """The picture of each step: present bodies in grey, new ones in colour before they are moved into place, screws named.
 
 The rotation axis is upright, on the bench the lidar's axis. Of eight sides, from above and below, the view is the one
-that shows the heads of the screws best; without screws it is the first.
+that shows the heads of the screws best, or that shows most of the cables in place; else it is the first.
 """
 
 import io
@@ -16,12 +16,14 @@ from scanwright.cad.assembly.scenes import StepScene
 from scanwright.cad.drawings.dimensions import spread
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.layout.joints import Joint
+from scanwright.cad.layout.names import DECK, SERVO_CASE
 from scanwright.cad.screws import Screw
 from scanwright.design.arrays import Array, Vector
 from scanwright.design.scene.parallel_view import ParallelView, view_of
 from scanwright.design.scene.ray_caster import Scene, build_scene
 
 SIZE_PX = 720, 480  # pixels, wide and high
+SMALL_PX = 128, 120  # of a picture that only counts what is visible
 WORDS_PX = 210  # of them at the right, for the screws
 TEXT_PX, LINE_PX = 15, 20
 MARGIN = 1.06
@@ -110,11 +112,15 @@ class StepPictures:
         pieces = [self._piece(name, np.zeros(3), GREY) for name in scene.there]
         for sign, shift in shifts.items():
             pieces += [self._piece(name, shift, MADE if name in self._made else BOUGHT) for name in groups[sign]]
-        placed = [(joint, shifts[1.0] if joint.part in scene.comes else np.zeros(3)) for joint, _ in scene.joints]
-        pieces += [Piece(build_scene(body), moved, METAL) for joint, moved in placed for body in _fasteners(joint)]
+        moved_by = {name: shifts[sign] for sign, names in groups.items() for name in names}
+        placed = [(joint, moved_by.get(joint.part, np.zeros(3))) for joint, _ in scene.joints]
+        for joint, moved in placed:
+            pieces += [Piece(build_scene(body), moved, METAL) for body in _screws(joint)]
+            beyond = moved if joint.onto in (DECK, SERVO_CASE) else moved_by.get(joint.onto, np.zeros(3))
+            pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint)]
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
-        yaw, pitch = _side(scene)
         width, height = SIZE_PX
+        yaw, pitch = _side(scene) if np.any(scene.along) else _clearest(scene, corners, pieces)
         view = view_of(corners, (width - WORDS_PX, height), yaw, pitch, MARGIN, scene.R_rot_picture)
         image = Image.new("RGB", SIZE_PX, LIGHT)
         image.paste(painted(view, pieces), (0, 0))
@@ -164,16 +170,35 @@ def _side(scene: StepScene) -> tuple[float, float]:
     return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
 
 
-def _fasteners(joint: Joint) -> list[Array]:
-    """Return triangles of screws and of their loose nuts, before they are put in [m], each of shape (t, 3, 3)."""
-    bodies = []
-    for axis in joint.axes:
-        start, along = np.array(axis.start), np.array(axis.along)
-        bodies.append(_screw(joint, start - _out(joint) * along, along))
-        if joint.fixing in ("nut", "deck"):
-            face = start + (joint.grip_mm + joint.thread_mm + OUT_MM) * along
-            bodies.append(rod(face, along, joint.screw.nut_across / math.sqrt(3), joint.screw.nut_height, 6))
-    return [body / 1000 for body in bodies]
+def _clearest(scene: StepScene, corners: Array, pieces: Sequence[Piece]) -> tuple[float, float]:
+    """Return the yaw and pitch [rad] of the view in which most of the new bodies is visible, preferably from above."""
+
+    def seen(yaw: float, pitch: float) -> float:
+        view = view_of(corners, SMALL_PX, yaw, pitch, MARGIN, scene.R_rot_picture)
+        away = np.stack([view.shown(piece.scene, piece.moved_m).away_m for piece in pieces])
+        new = np.array([piece.colour is not GREY for piece in pieces])
+        pixels = np.isfinite(away.min(axis=0)) & new[away.argmin(axis=0)]
+        return float(pixels.sum()) * view.pixel_m**2 * (1.0 - BELOW * (pitch < 0))
+
+    return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
+
+
+def _screws(joint: Joint) -> list[Array]:
+    """Return triangles of screws before they are put in [m], each of shape (t, 3, 3)."""
+    axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
+    return [_screw(joint, start - _out(joint) * along, along) / 1000 for start, along in axes]
+
+
+def _nuts(joint: Joint) -> list[Array]:
+    """Return triangles of loose nuts off their face [m], each of shape (t, 3, 3)."""
+    if joint.fixing not in ("nut", "deck"):
+        return []
+    size, off = joint.screw, joint.grip_mm + joint.thread_mm + OUT_MM
+    axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
+    return [
+        rod(start + off * along, along, size.nut_across / math.sqrt(3), size.nut_height, 6) / 1000
+        for start, along in axes
+    ]
 
 
 def _out(joint: Joint) -> float:
@@ -227,6 +252,14 @@ def _call_out(
 
 def _lines_of(joint: Joint, torque: str) -> tuple[str, ...]:
     """Return a joint in a few short lines."""
+    held = f"{'washers, ' * (joint.washer_mm is not None)}{torque}"
+    if joint.fixing == "trap":
+        return (
+            f"{joint.count} x {joint.number}",
+            held,
+            f"onto {joint.count} nuts {joint.screw.name}",
+            f"in {joint.onto}",
+        )
     nuts = (f"{joint.count} nuts {joint.screw.name}",) if joint.fixing in ("nut", "deck") else ()
     where = "against" if joint.fixing == "grub" else "into"
-    return f"{joint.count} x {joint.number}", torque, f"{where} {joint.onto}", *nuts
+    return f"{joint.count} x {joint.number}", held, f"{where} {joint.onto}", *nuts

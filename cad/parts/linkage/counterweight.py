@@ -47,11 +47,12 @@ def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
         if tie is None or not tie.grooved
         else "First lay a cable tie into the groove next to the hub, for the leads. "
     )
+    leads = "The leads of the ring pass below their heads. " if place.scanner.slip_ring else ""
     words = (
-        f"{first}Put the bar on the ear of the hub, its threads over the slots, and drive the screws from below, in "
-        f"the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} The leads of the ring pass below their "
-        "heads. A lidar's centre of mass is undocumented: when the scanner turns, slide the bar along its slots "
-        "until `scanwright scan` prints the least ripple."
+        f"{first}Put the counterweight on the ear of the hub, its threads over the slots, and drive the screws "
+        f"from below, in the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} {leads}A lidar's centre "
+        "of mass is undocumented: when the scanner turns, slide the bar along its slots until `scanwright scan` "
+        "prints the least ripple."
     )
     return PartSpec(
         name=COUNTERWEIGHT,

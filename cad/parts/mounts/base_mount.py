@@ -53,8 +53,8 @@ TOWER_STEP = Step(
 )
 FRAME_STEP = Step(
     "Frame on the mount",
-    f"Put the frame on the rails of the base mount. {screws(SERVO_FRAME)} Connect the servo's cable now, and lay a "
-    f"cable tie into the slots of the foot at its exit. {screws(DECK)}",
+    f"Put the frame on the rails of the base mount, a nut into the slot of each of its feet. {screws(SERVO_FRAME)} "
+    f"Connect the servo's cable now, and lay a cable tie into the slots of the foot at its exit. {screws(DECK)}",
     check="the frame does not rock on its four feet, nor the mount on the deck",
 )
 RAIL_HALF = 5.0  # of the mount's rails, at most

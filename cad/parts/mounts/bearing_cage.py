@@ -64,10 +64,11 @@ def bell_spec(place: Placement) -> PartSpec | None:
     )
     leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
-        f"With the axis upright, spread slow epoxy thinly in the seat, press the bearing in, {leads}and lower the cage "
-        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the servo once "
-        "around, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and let the "
-        "epoxy set before you load the shaft: it fills the gaps of the print."
+        "Hold the axis upright; if the deck cannot be tilted, take the mount off it. Spread slow epoxy thinly in the "
+        f"seat, press the bearing in, {leads}and lower the cage "
+        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the shaft once "
+        "around by hand, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and "
+        "let the epoxy set before you load the shaft: it fills the gaps of the print."
     )
     return PartSpec(
         name=BEARING_CAGE,

@@ -68,7 +68,9 @@ def tower_spec(place: Placement) -> PartSpec | None:
         thread_mm=SCREW_DEPTH - fit / 2,
         thread=thread_in_part(DISC_SCREW, printer, nut_fits=False),
     )
-    words = "Press one bearing into each end of the tower's lip by its outer ring: one from above, one from below."
+    words = (
+        "Press one bearing into the tower from above and one from below, each by its outer ring, until it is seated."
+    )
     return PartSpec(
         name=BEARING_TOWER,
         turns=False,

@@ -28,8 +28,8 @@ RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubi
 RING_STEP = Step(
     "Capsule into the tower",
     "Pull the rotor's leads up the shaft and out of its windows, those of each cable through the one that the step "
-    '"Leads between lidar and ring" names, if there is one, and slide the disc into the tower from below until the '
-    "soft tube is in the shaft. "
+    '"Leads between lidar and ring" names, if there is one. Slide the disc into the tower from below, its three '
+    "threads behind the holes of the tower, and the soft tube into the bore of the shaft. "
     f"{screws(SLIP_RING_ADAPTER, BEARING_TOWER)}",
     "turned by hand, the shaft turns the rotor without slipping",
 )
@@ -45,9 +45,12 @@ def holder_spec(place: Placement) -> PartSpec | None:
     tube = TUBE_INSIDE + stack.capsule_gap
     soft_tube = SOFT_TUBE.format(tube, stack.shaft_bore, stack.rotor.diameter_mm)
     words = (
-        "On the bench: put the capsule through the disc from above, its flange on the disc, its rotor upwards. "
-        f"{screws(RING_STATOR)} Leave them so loose that the flange still moves. Push {tube:.0f} mm of soft tube, "
-        f"{stack.shaft_bore:g} x {stack.rotor.diameter_mm:g} mm, over the stub of the rotor."
+        "On the bench: put the slip ring, a capsule, through the disc from above, its flange on the disc, its rotor "
+        "upwards. "
+        f"{screws(RING_STATOR)} The nuts lie on the flange. Stop before that torque, while the flange still moves; the "
+        f"threadlocker holds the nuts. Cut {tube:.0f} mm of soft tube, {stack.shaft_bore:g} mm outside and "
+        f"{stack.rotor.diameter_mm:g} mm inside, and push it over the stub of the rotor until it almost touches the "
+        "body."
     )
     return PartSpec(
         name=SLIP_RING_ADAPTER,

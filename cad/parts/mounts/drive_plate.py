@@ -30,7 +30,10 @@ def plate_spec(place: Placement) -> PartSpec | None:
     p, stack, printer = place.drive.of(Ears), place.drive.of(BeltStack), place.scanner.printer
     if p is None or stack is None:
         return None
-    words = f"{to_centre(place.scanner.servo)} Put the plate on its front. {screws(SERVO_CASE)}"
+    words = (
+        f"{to_centre(place.scanner.servo)} Put the plate on the servo's front, the horn through its hole. "
+        f"{screws(SERVO_CASE)}"
+    )
     R, t, heads = stack.turn(), stack.servo_origin() * [1.0, 1.0, 0.0], stack.tower_top + UNDER_HEAD
     axes = placed_axes(upright_axes(p.holes, heads, -1.0), R, t)
     slots = [(x, y) for x in (-stack.slot_x, stack.slot_x) for _, y in stack.arms_y]

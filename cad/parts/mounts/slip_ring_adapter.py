@@ -30,9 +30,10 @@ from scanwright.design.catalogue.servo import Servo
 
 RING_STEP = Step(
     "Slip ring",
-    "Pass the plugs of the stator's leads down on the side of the index, and lower the ring over the shaft, its "
-    "collar upwards. Clamp the collar to the shaft with its own set screws. Turn the stator until its leads hang "
-    "straight, and hold it by a cable tie in the grooves of the adapter: it can move a little, but must not turn.",
+    "Pass the plugs of the stator's leads down on the side of the index groove, and lower the slip ring over the "
+    "shaft, its collar upwards. Clamp its collar to the shaft with the set screws that are in it. Turn the stator "
+    "until its leads hang straight, and hold it by a cable tie in the grooves of the adapter: it can move a "
+    "little, but must not turn.",
     "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )
 OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
@@ -49,7 +50,11 @@ def adapter_spec(place: Placement) -> PartSpec | None:
     stack, fork, cage = place.drive.of(DirectStack), place.drive.of(Ears), place.drive.of(BearingCage)
     if stack is None or place.scanner.slip_ring is None:
         return None
-    how = "Lower the plate over the shaft." if fork is None else "Slide the fork around the flange of the shaft."
+    how = (
+        "Lower the adapter over the shaft, its arms upwards."
+        if fork is None
+        else "Slide the fork around the flange of the shaft."
+    )
     ears = fork if cage is None else cage.ears
     assert ears is not None  # a fork, or the base of a cage
     servo = place.scanner.servo

@@ -37,8 +37,8 @@ def cup_spec(place: Placement) -> PartSpec | None:
     if stack is None or stack.cup_bore == 0:
         return None
     words = (
-        f"{to_centre(place.scanner.servo)} Put the cup on the horn so that its index "
-        f"groove points to the servo's +Y face, the end of the case nearest to the horn. {screws(SERVO_HORN)}"
+        f"{to_centre(place.scanner.servo)} Put the cup on the horn so that its flat and "
+        f"its index groove face the servo's +Y face, the end of the case nearest to the horn. {screws(SERVO_HORN)}"
     )
     return PartSpec(
         name=HORN_CUP,

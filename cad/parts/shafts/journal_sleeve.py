@@ -32,10 +32,15 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     stack = place.drive.of(DirectStack)
     if stack is None or stack.bearing is None:
         return None
+    leads = (
+        ", its channel on the side of the linkage's channel for the leads; lay the leads of the slip ring's rotor "
+        "into it"
+        if place.scanner.slip_ring
+        else ""
+    )
     words = (
         f"Snap a retaining ring DIN 471 - {stack.retaining_ring} into the groove of the shaft. Put retaining compound "
-        "on the shaft above it and slide the sleeve down onto the ring, its channel on the side of the linkage's "
-        "channel for the leads; lay the rotor's leads into it. Let the compound set."
+        f"on the shaft above it and slide the sleeve down onto that ring{leads}. Let the compound set."
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + BOND, True, "±0.01", "bonded to the shaft")
@@ -52,6 +57,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         shaped_by=("bearing.bore_mm", "bearing.width_mm", "slip_ring.bore_mm"),
         rows=(
             Row("consumable", "retaining ring", f"retaining ring DIN 471 - {stack.retaining_ring}", RETAINING),
+            Row("tool", "circlip pliers", "pliers for external retaining rings", "assembly.md", "for DIN 471"),
             Row("consumable", "retaining compound", COMPOUND, "sleeve on the shaft"),
         ),
     )

@@ -30,7 +30,7 @@ from scanwright.cad.layout.joints import (
     screws,
 )
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import HORN, PartSpec, Step, no_wider
+from scanwright.cad.parts.part_spec import HORN, PartSpec, Row, Step, no_wider
 from scanwright.cad.screws import SCREWS, Thread, passing_hole, thread_in_part
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.products import Printer
@@ -100,7 +100,8 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
     words = (
         f"The boss of the horn centres the pulley. {screws(names.SERVO_OUTPUT)} Hang the servo between the arms of the "
         "tower, put the belt around both pulleys, and insert the screws of the slots: "
-        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N in the "
+        f"{screws(names.BEARING_TOWER, names.DRIVE_PLATE)} Pull the plate outwards until a push of {push:.1f} N "
+        "(spring scale) in the "
         f"middle of a strand moves it by {GIVE_MM:g} mm: that is {PRELOAD_N:g} N in each strand. The centres are then "
         f"{stack.centre:g} mm apart; the slots allow {TRAVEL:g} mm to either side."
     )
@@ -110,7 +111,8 @@ def drive_pulley_spec(place: Placement) -> PartSpec | None:
         name=names.DRIVE_PULLEY,
         turns=False,
         make=partial(drive_pulley, stack, scanner.printer, foot),
-        step=Step("Drive pulley and servo", words, "the belt runs a turn in its rims"),
+        step=Step("Drive pulley and servo", words, "the belt stays between the rims for a turn by hand"),
+        rows=(Row("tool", "spring scale", "spring scale", "assembly.md", "0 to 5 N, for the belt"),),
         fits=fits,
         notes=(_teeth_words(stack),),
         axis=stack.horn_axis,

@@ -61,7 +61,8 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
     rows: tuple[Row, ...] = ()
     if stack.bearing is not None:
         words += (
-            " Loosen them by a quarter turn, put an indicator on the upper end of the shaft and turn the servo once: "
+            " Loosen them by a quarter turn, put an indicator on the upper end of the shaft and turn the shaft once "
+            "by hand: "
             f"tap the flange until the shaft runs true within {TRUED_MM:g} mm over the turn, then tighten them."
         )
         check = f"{check}, and the indicator stays within {TRUED_MM:g} mm"

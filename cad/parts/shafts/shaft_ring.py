@@ -29,15 +29,16 @@ def shaft_ring_spec(place: Placement) -> PartSpec | None:
     bore, hole = _bore(stack, printer), passing_hole(RING_SCREW, printer) / 2
     azimuths = (math.radians(azimuth) for azimuth in RING_SCREWS_DEG)
     words = (
-        "From below push the ring up the shaft, its step against the lower bearing and its holes over the threads, so "
-        f"that the shaft has no clearance along the axis and still turns freely. {screws(MAIN_SHAFT)} They and a "
-        "driver pass the round window in the tower: turn the shaft until the holes are visible."
+        "From below push the shaft ring up the shaft, its step against the lower bearing and its holes over the "
+        "threads, so that the shaft has no clearance along the axis and still turns freely. "
+        f"{screws(MAIN_SHAFT)} Screws and driver pass the round window in the tower: turn the shaft until each hole is "
+        "visible there."
     )
     return PartSpec(
         name=SHAFT_RING,
         turns=True,
         make=partial(shaft_ring, stack, printer),
-        step=Step("Ring under the bearings", words, "pushed and pulled along its axis the shaft does not click"),
+        step=Step("Shaft ring under the bearings", words, "pushed and pulled along its axis the shaft does not click"),
         joints=(
             Joint(
                 SHAFT_RING,

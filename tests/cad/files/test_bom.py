@@ -110,6 +110,8 @@ def test_the_tools_are_those_that_the_steps_ask_for(rows, made):
     tools = {row["part"] for row in rows if row["kind"] == "tool"}
     assert ("join the leads" in steps) == ("crimping pliers" in tools)
     assert ("heat-set insert" in steps) == ("soldering iron" in tools)
+    assert ("retaining ring" in steps) == ("pliers for external retaining rings" in tools)
+    assert ("spring scale" in steps) == ("spring scale" in tools)
     assert any("crimps" in row["part"] for row in rows)
 
 
