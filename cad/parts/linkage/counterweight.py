@@ -49,7 +49,7 @@ def bar_spec(place: Placement, bar: Counterweight) -> PartSpec:
     )
     leads = "The leads of the ring pass below their heads. " if place.scanner.slip_ring else ""
     words = (
-        f"{first}Put the counterweight on the ear of the hub, its threads over the slots, and drive the screws "
+        f"{first}Put the {COUNTERWEIGHT} on the ear of the hub, its threads over the slots, and drive the screws "
         f"from below, in the middle of the slots. {screws(COUNTERWEIGHT, ALIGNMENT_LINKAGE)} {leads}A lidar's centre "
         "of mass is undocumented: when the scanner turns, slide the bar along its slots until `scanwright scan` "
         "prints the least ripple."
