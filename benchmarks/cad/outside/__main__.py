@@ -145,6 +145,8 @@ def main(words: list[str]) -> int:
     if words[:1] == ["--random"]:
         folders, refused = built(RANDOM, int(words[1]), int(words[2]) if len(words) > 2 else 0)
         print(*(f"refused {line}" for line in refused), sep="\n")
+    if missing := [folder for folder in folders if not (folder / "checks.json").is_file()]:
+        sys.exit(f"{missing[0]}: no checks.json: name the folder of a build, such as out/low_cost")
     products, faults, screws = catalogue(), 0, 0
     for folder in folders:
         found = measured(folder, products)
