@@ -68,7 +68,7 @@ def test_a_nut_drops_into_a_boss_before_the_ring_comes(nutted):
         assert _shared(_nut(inner - 0.5 * inwards, inwards, 0.0), base) > 5.0
 
 
-def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
+def test_nuts_are_in_the_documents_and_those_without_a_trap_found(nutted):
     _, assembly, _, joints = nutted
     trapped = {(joint.part, joint.onto): joint for joint in joints if joint.traps}
     cage = trapped[("bearing_cage", "slip_ring_adapter")]
@@ -77,7 +77,7 @@ def test_nuts_are_bought_told_and_those_without_a_trap_found(nutted):
     items = items_of(assembly, dict.fromkeys(assembly.made, 1.0))
     assert next(item.quantity for item in items if item.number == "ISO 4032 M3") == 4
     text = instructions_text(assembly, scenes_of(assembly), [])
-    assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into their pockets" in text
+    assert "onto 4 nuts M3 in slip_ring_adapter" in text and "nuts into the pockets of slip_ring_adapter" in text
     assert without_traps(PRINTER, joints) == []
     core = thread_in_part(M3, PRINTER, nut_fits=False)
     plain = [replace(cage, fixing="thread", thread=core)]
