@@ -1,10 +1,11 @@
-"""Random scanners of all that go together: `python -m benchmarks.cad.random_scanners COUNT [SEED]`.
+"""Random scanners of all that go together: `python -m benchmarks.cad.random_scanners COUNT [SEED [FIRST]]`.
 
-Every lidar, servo and ring that `benchmarks.cad.combinations` lays out takes its turn, in a random order; attitude,
-printer and modules are random. Each scanner is made and checked in memory as a build does it. One line for each that
-does not pass, then how many passed, were refused (reasons counted), failed loudly (with which checks), and failed
-silently: an exception that is no BuildError, or all checks passed and this script, which reads the solids and records
-itself, still finds a fault. Exit code 1 if one failed silently.
+Takes COUNT of all combinations of lidar, servo and ring, in a random order, from number FIRST on (1 if not given), so
+that several runs share the work or go on with it. Those that `benchmarks.cad.combinations` lays out are made and
+checked in memory as a build does it, with random attitude, printer and modules. One line for each that does not pass,
+then how many passed, were refused (reasons counted), failed loudly (with which checks), and failed silently: an
+exception that is no BuildError, or all checks passed and this script, which reads the solids and records itself, still
+finds a fault. Ctrl-C ends the run with the totals so far. Exit code 1 if one failed silently.
 """
 
 from __future__ import annotations
@@ -39,14 +40,13 @@ SOLID_MM3 = 1.0  # less than any part
 Products = tuple[str, str, str | None]
 
 
-def drawn(catalogue: Catalogue, rng: np.random.Generator) -> Iterator[Products]:
-    """Yield every lidar, servo and ring that can be laid out at one attitude at least, in a random order, endlessly."""
+def shuffled(catalogue: Catalogue, rng: np.random.Generator) -> list[Products]:
+    """Return every lidar with every servo and ring, or no ring, in a random order."""
     lidars, servos, rings = (
         [one.name for one in catalogue if isinstance(one, kind)] for kind in (Lidar, Servo, SlipRing)
     )
     every = list(itertools.product(lidars, servos, [None, *rings]))
-    while True:
-        yield from (every[i] for i in rng.permutation(len(every)) if _fits(catalogue, *every[i]))
+    return [every[i] for i in rng.permutation(len(every))]
 
 
 def _fits(catalogue: Catalogue, lidar: str, servo: str, ring: str | None) -> bool:
@@ -93,22 +93,26 @@ def silent_faults(scanner: Scanner, assembly: Assembly) -> Iterator[str]:
     yield from screws_without_a_hole(assembly.layout)
 
 
-def main(count: int, seed: int = 0) -> None:
+def main(count: int, seed: int = 0, first: int = 1) -> None:
     """Print the lines."""
-    catalogue, rng = load_catalogue(), np.random.default_rng(seed)
+    catalogue = load_catalogue()
+    every = shuffled(catalogue, np.random.default_rng(seed))
     outcomes, refused, failed = Counter[str](), Counter[str](), Counter[str]()
-    for number, products in enumerate(itertools.islice(drawn(catalogue, rng), count), start=1):
-        scanner = random_scanner(catalogue, products, rng)
-        angles = scanner.angles.angles_deg
-        at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"
-        outcome, words = _outcome(scanner, refused, failed)
-        outcomes[outcome] += 1
-        if outcome != "passed":
-            print(
-                f"{number} {' '.join(map(str, products))} at {at} on {scanner.printer.name}: {outcome}: {words}",
-                flush=True,
-            )
-    print(f"{count} scanners: {dict(outcomes)}")
+    last = first - 1
+    with contextlib.suppress(KeyboardInterrupt):
+        for number, products in enumerate(every[last : last + count], start=first):
+            outcome, line = "not laid out", ""
+            if _fits(catalogue, *products):
+                scanner = random_scanner(catalogue, products, np.random.default_rng((seed, number)))
+                outcome, words = _outcome(scanner, refused, failed)
+                angles = scanner.angles.angles_deg
+                at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"
+                line = f"{' '.join(map(str, products))} at {at} on {scanner.printer.name}: {outcome}: {words}"
+            outcomes[outcome] += 1
+            last = number
+            if outcome not in ("passed", "not laid out"):
+                print(f"{number} {line}", flush=True)
+    print(f"combinations {first} to {last} of {len(every)}, seed {seed}: {dict(outcomes)}")
     for title, counts in (("refused", refused), ("failed", failed)):
         for reason, n in counts.most_common():
             print(f"  {title} {n}: {reason}")
