@@ -139,4 +139,4 @@ def _outcome(scanner: Scanner, refused: Counter[str], failed: Counter[str]) -> t
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:3]))
+    main(*map(int, sys.argv[1:4]))
