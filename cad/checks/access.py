@@ -113,13 +113,17 @@ def driver_rays(joint: Joint) -> tuple[Array, Array]:
     """Return starts [mm] of rays on a driver's axis and rim, shape (screws, rays, 3), and directions (screws, 1, 3)."""
     radius = KEYS_MM.get(joint.screw.name, BY_HAND_MM)[0]
     over = OVER_HEAD_MM + (0.0 if joint.fixing == "grub" else joint.screw.head_height)
-    turn = 2 * math.pi * np.arange(RAYS) / RAYS
     starts, back = [], -np.array([axis.along for axis in joint.axes])
     for axis, along in zip(joint.axes, back, strict=True):
-        across = np.linalg.svd(along[None])[2][1:]
-        rim = radius * (np.cos(turn)[:, None] * across[0] + np.sin(turn)[:, None] * across[1])
-        starts.append(axis.start + over * along + np.concatenate([np.zeros((1, 3)), rim]))
+        starts.append(axis.start + over * along + np.concatenate([np.zeros((1, 3)), circle(along, radius)]))
     return np.stack(starts), back[:, None]
+
+
+def circle(axis: Array, radius: float) -> Array:
+    """Return points of a circle about an axis through the origin, shape (RAYS, 3)."""
+    turn = 2 * math.pi * np.arange(RAYS) / RAYS
+    across = np.linalg.svd(axis[None])[2][1:]
+    return radius * (np.cos(turn)[:, None] * across[0] + np.sin(turn)[:, None] * across[1])
 
 
 def _bodies(assembly: Assembly) -> dict[str, Body]:

@@ -20,6 +20,7 @@ from scanwright.cad.checks.loads.mechanics import mechanics_checks
 from scanwright.cad.checks.loads.retention import retention_checks
 from scanwright.cad.checks.printing import printing_checks
 from scanwright.cad.checks.products import module_checks, unverified_checks, wiring_checks
+from scanwright.cad.checks.seats import seat_checks
 from scanwright.cad.checks.table import with_change
 from scanwright.design.findings import Finding
 from scanwright.design.progress import Progress
@@ -48,6 +49,7 @@ def run_checks(assembly: Assembly, progress: Progress) -> tuple[list[Finding], S
     checks: tuple[Callable[[Assembly], Iterable[Finding]], ...] = (
         clearance_checks,
         access_checks,
+        seat_checks,
         partial(beam_checks, shadow=shadow),
         mechanics_checks,
         retention_checks,

@@ -11,6 +11,7 @@ from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding, Severity
 
 CLEARANCE_MM = 0.4  # two printed faces, each off by half a nozzle of 0.4 mm at most
+SEATED_SHARE = 0.4  # of a head: a slot, or a recess that is open to a side, takes the rest
 OVERLAP_MM3 = 0.05  # of the meshes of two bodies that touch: their chords
 LINKAGE_HIDES_SHARE = 0.03  # of the field of view, beyond servo, ring and shaft; J with parts accounts for it
 FREQUENCY_RATIO = 1.2  # of the first natural frequency to the lidar's mirror: clear of its resonance
@@ -41,6 +42,12 @@ TABLE = (
         "straight line for a key on every screw's head, in the step of assembly that needs it",
         "none blocked",
         "lengths of keys, ISO 2936",
+    ),
+    CheckRow(
+        "screw_seat",
+        "share of every screw's head that has material under it, around a hole",
+        f"at least {SEATED_SHARE:.0%}",
+        "chosen",
     ),
     CheckRow("beams_hidden", "beams hidden at every axis angle"),
     CheckRow("beams_partly_hidden", "beams hidden on average over a turn"),
@@ -121,6 +128,7 @@ CHANGES = {
     "clearance": OTHER_MOUNT,
     "interference": OTHER_MOUNT,
     "driver_access": OTHER_MOUNT,
+    "screw_seat": OTHER_MOUNT,
     "beams_linkage": OTHER_MOUNT,
     "static_torque": STRONGER,
     "spin_up_torque": f"take a longer period_s in [motion], or {STRONGER}",

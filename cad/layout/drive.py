@@ -102,6 +102,7 @@ class Ears:
     thread: Thread | None = None  # of a printed one
     # from the line of a pair to the edge over which the plate tips, which then lies on the entire face; None for others
     heel_mm: float | None = None
+    covers: tuple[tuple[float, float, Screw], ...] = ()  # heads of a frame's own screws under the plate, in pockets
 
 
 def ears_on(scanner: Scanner, opening: float, holes: tuple[tuple[float, float], ...]) -> Ears:
@@ -200,7 +201,7 @@ class DriveLayout:
     built: tuple[str, ...]  # parts and products in assembly order; other parts state which one they follow
     left_out: tuple[LeftOut, ...]  # parts that this scanner does not need
     plain: bool  # whether two pairs of front holes, away from all that turns, carry the parts on the servo
-    # parts that another one fixes along the axis without a screw, by a bearing or a retaining ring
+    # parts that another one fixes along the axis without a screw, by a bearing or a clamped ring
     borne: tuple[tuple[str, str], ...] = ()
 
     def of(self, kind: type[Record]) -> Record | None:

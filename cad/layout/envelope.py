@@ -260,7 +260,7 @@ def _driver_passes(lidar: Lidar, stack: Hub, hole: tuple[float, float]) -> bool:
     line = np.array([*hole, -lidar.optical_height_mm - plate_mm(lidar, None)]) @ R.T - depth[:, None] * R[:, 2]
     reach = np.hypot(line[:, 0], line[:, 1]) - driver
     hub = (line[:, 2] > stack.shoulder - driver) & (line[:, 2] < driver - stack.h)
-    journal = (line[:, 2] > stack.hub_bottom - driver) & (line[:, 2] < stack.hub_bottom + stack.journal)
+    journal = (line[:, 2] > stack.sleeve_low - driver) & (line[:, 2] < stack.sleeve_low + stack.journal)
     radius = 0.0 if stack.bearing is None else stack.bearing.bore_mm / 2
     return bool((reach > stack.shaft_diameter / 2 + 3.0)[hub].all() and (reach > radius)[journal].all())
 

@@ -25,7 +25,8 @@ WASHER_WALL = 1.5  # of the hub below the washers of its cross screws
 BEARING_STEP = 0.5  # between a face that turns and the bearing: only the inner ring touches
 JOURNAL_WALL = 2.2  # of the sleeve between bore and leads
 LEANING = 1.15  # width of a lead across the axis, over its diameter, at its bend outwards
-JOURNAL_END = 1.0  # of the sleeve below the bearing
+SLEEVE_CLEAR = 1.0  # of the sleeve between the bearing and its end with the grub screws
+SLEEVE_END = 5.5  # length of that end
 
 Axis = Literal["x", "y"]
 
@@ -111,11 +112,11 @@ class Hub(ABC):
     @property
     def journal(self) -> float:
         """Length of the bearing's sleeve below the hub."""
-        return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + JOURNAL_END
+        return 0.0 if self.bearing is None else BEARING_STEP + self.bearing.width_mm + SLEEVE_CLEAR + SLEEVE_END
 
     @property
-    def hub_bottom(self) -> float:
-        """Height of the lower end of the hub, or of the sleeve below it."""
+    def sleeve_low(self) -> float:
+        """Height of the lower end of the sleeve in a bearing, or of the hub without one."""
         return self.shoulder - self.journal
 
     @property

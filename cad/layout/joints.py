@@ -106,9 +106,12 @@ class Joint:
 def shank_mm(screw: Screw, grip: float, fixing: Fixing, depth: float) -> int:
     """Return the shortest sufficient standard length; in a shallow thread the longest that does not bottom.
 
-    `grip` is the length before the thread, `depth` that of the thread, or of the material before the nut.
+    `grip` is the length before the thread, `depth` that of the thread, or of the material before the nut, or of the
+    groove that the point of a grub screw enters: that screw does not stand out of its part if a shorter one exists.
     """
     known = LENGTHS[screw.name]
+    if fixing == "grub" and depth > 0:
+        return max((n for n in known if n <= grip + depth + 1e-6), default=known[0])
     if fixing == "grub":
         return next((n for n in known if n >= grip - 0.1), known[-1])
     if fixing == "trap":  # the hole ends at the nut, and there is space behind it

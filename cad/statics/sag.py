@@ -60,7 +60,7 @@ def linkage_sag(
 
 def with_shaft(sag: Sag, shaft: ShaftBend, stack: Hub, rotor: Inertial) -> Sag:
     """Return the sag of linkage and shaft, which the entire rotor bends."""
-    end = np.array([0.0, 0.0, stack.hub_bottom / 1000])
+    end = np.array([0.0, 0.0, stack.shoulder / 1000])
     turned, shifted = [], []
     for along in np.eye(3):
         force = rotor.mass_kg * STANDARD_GRAVITY_M_S2 * along

@@ -201,7 +201,7 @@ def row_of_scanner(
     """
     carriers = sum((mass_matrix(assembly.inertial(name)) for name in assembly.carriers()), np.zeros((6, 6)))
     shaft = (mass_matrix(bodies["rot"]) - carriers) / 2
-    springs = [of_shaft(assembly.layout.drive.gives, assembly.layout.stack.hub_bottom), linkage]
+    springs = [of_shaft(assembly.layout.drive.gives, assembly.layout.stack.shoulder), linkage]
     masses = [shaft, mass_matrix(bodies["laser"].moved(assembly.layout.scanner.angles.T_rot_laser()))]
     if mount is not None:
         fixed = mass_matrix(bodies["servo"]) - mass_matrix(assembly.inertial(BASE_MOUNT))

@@ -91,7 +91,7 @@ def _of_joint(assembly: Assembly, joint: Joint) -> Iterator[Finding]:
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     carries = LIDAR in hanging
     if hold is None:
-        message = f"{both}: {joint.count} x {joint.number} hold by friction: they only keep it from turning"
+        message = f"{both}: {joint.count} x {joint.number} hold by friction: they only keep it in place"
         yield Finding("retention", "error" if carries else "note", subject, message)
         return
     bare = joint.fixing == "thread" and not joint.inserts and material_of(assembly, joint.onto).plastic

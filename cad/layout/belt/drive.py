@@ -153,7 +153,7 @@ def _mounted(stack: BeltStack, thread: Thread) -> Mounted:
 
 def _lead_exits(stack: BeltStack, bundle: Bundle, tie: TieSeat | None, _azimuth: float) -> Iterator[LeadExit]:
     """Yield the path of the leads up the bore and out by its two windows."""
-    low, middle = stack.ring_top + stack.rotor.length_mm, stack.hub_bottom - WINDOW_BELOW
+    low, middle = stack.ring_top + stack.rotor.length_mm, stack.shoulder - WINDOW_BELOW
     ends = []
     for sign in (1.0, -1.0) if bundle.count == 1 else (1.0 - 2.0 * (bundle.number % 2),):
         side = sign * (bundle.half + BUNDLE_GAP)

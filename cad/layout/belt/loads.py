@@ -72,9 +72,9 @@ def belt_shaft_bend(stack: BeltStack, seat_m_per_n: float = 0.0) -> ShaftBend:
     """
     second_moment = math.pi / 64 * (stack.tube_diameter**4 - stack.shaft_bore**4) * 1e-12  # m4
     EI, shear_pa = ALUMINIUM_PA * second_moment, ALUMINIUM_PA / (2 + 2 * METAL_POISSON)
-    twist = (stack.hub_bottom - stack.belt_middle) / 1000 / (shear_pa * 2 * second_moment)
+    twist = (stack.shoulder - stack.belt_middle) / 1000 / (shear_pa * 2 * second_moment)
     span = (stack.upper_middle - stack.lower_middle) / 1000
-    over = (stack.hub_bottom - stack.upper_middle) / 1000
+    over = (stack.shoulder - stack.upper_middle) / 1000
     coupled = over * span / (3 * EI) + over**2 / (2 * EI)
     area = math.pi * (stack.tube_diameter**2 - stack.shaft_bore**2) / 4e6
     carried = np.array([[1 + over / span, over / span], [1 / span, 1 / span]])  # by the supports, of force and moment

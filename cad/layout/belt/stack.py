@@ -4,7 +4,7 @@ The servo is next to the shaft; its belt is toothed and 1:1, so that its absolut
 
 Rotation frame at gamma = 0, mm, from the hub of `cad/layout/hub.py` downwards:
 
-    hub_bottom        the shaft's spigot begins, which ends in the hub as in direct drive
+    shoulder          the shaft's spigot begins, which ends in the hub as in direct drive
     pulley_top        LEADS_GAP below: the leads leave the shaft between
     teeth_top         a boss with grub screws holds the pulley on the shaft
     teeth_low         the pulley's lower face lies on a collar of the shaft
@@ -105,7 +105,7 @@ class BeltStack(Hub):
     @property
     def pulley_top(self) -> float:
         """Height of the upper end of the boss."""
-        return self.hub_bottom - LEADS_GAP
+        return self.shoulder - LEADS_GAP
 
     @property
     def teeth_top(self) -> float:

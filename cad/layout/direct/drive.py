@@ -118,7 +118,6 @@ def direct_drive(scanner: Scanner, envelope: Envelope, cross: CrossScrew) -> Dri
         built=BUILT,
         left_out=tuple(_left_out(scanner, stack, frame)),
         plain=framed is None,
-        borne=() if cage is None else ((names.JOURNAL_SLEEVE, names.SERVO_SHAFT),),
     )
 
 
@@ -149,7 +148,7 @@ def _stations(
         yield Station(names.BEARING_CAGE, "base", (cage.foot, stack.cage_top), stack.cage_outer)
         seat = Rod(bearing.outer_mm / 2, stack.bearing_top - bearing.width_mm, stack.bearing_top)
         yield Station.half_turning(bearing, seat)
-        yield Station(names.JOURNAL_SLEEVE, "rotor", (stack.hub_bottom, stack.shoulder), bearing.bore_mm / 2)
+        yield Station(names.JOURNAL_SLEEVE, "rotor", (stack.sleeve_low, stack.shoulder), bearing.bore_mm / 2)
     yield Station(names.ALIGNMENT_LINKAGE, "rotor", (stack.shoulder, -stack.h), stack.hub_radius)
 
 

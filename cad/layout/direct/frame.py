@@ -121,11 +121,12 @@ def needs_frame(servo: Servo) -> bool:
 def frame_ears(scanner: Scanner, opening: float, *, fork: bool) -> Ears:
     """Return the holes in the corners of a frame for a plate that leaves the heads of the servo's screws free.
 
-    `opening` is the least radius of the plate's opening, or half width of a fork's.
+    `opening` is the radius of the plate's opening, or the least half width of a fork's, which is as wide as the heads.
     """
     servo, printer = scanner.servo, scanner.printer
-    heads = SCREWS[servo.front.screw].driver_radius
-    heads += max(abs(x) if fork else math.hypot(x, y) for x, y in servo.front.places)
+    head = SCREWS[servo.front.screw]
+    if fork:
+        opening = max(opening, max(abs(x) for x, _ in servo.front.places) + head.driver_radius)
     thread = thread_in_part(EAR_SCREW, printer, carries=True)
     half_x, front = _half_x(servo), servo.front.z_mm + GRIP
     rows_y = servo.case_min_mm[1] + EAR_EDGE, servo.case_max_mm[1] - EAR_EDGE
@@ -133,7 +134,7 @@ def frame_ears(scanner: Scanner, opening: float, *, fork: bool) -> Ears:
         onto=SERVO_FRAME,
         front=front,
         seats=front,
-        opening=max(opening, heads),
+        opening=opening,
         half_x=half_x + EAR_LEG,
         screw=EAR_SCREW,
         hole=passing_hole(EAR_SCREW, printer),
@@ -141,6 +142,7 @@ def frame_ears(scanner: Scanner, opening: float, *, fork: bool) -> Ears:
         fixing=fixing_in(thread),
         thread_mm=EAR_DEPTH if thread.trap is None else EAR_NUT,
         thread=thread,
+        covers=() if fork else tuple((x, y, head) for x, y in servo.front.places),
     )
 
 

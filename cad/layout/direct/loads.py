@@ -126,7 +126,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
     bend, reach = thick / 1000 / EI, b - z
     give = float((bend * reach**2).sum()) + 1 / cage_n_per_m
     R = float((bend * reach * moment).sum()) / give
-    over = (stack.hub_bottom - stack.bearing_middle) / 1000
+    over = (stack.shoulder - stack.bearing_middle) / 1000
     beyond = weight.across_n * (weight.lever_m - b - over / 2) + weight.along_n * weight.off_axis_m
     shaft = metal.modulus_pa * math.pi / 64 * (stack.shaft_diameter / 1000) ** 4
     slope = float((bend * (moment - R * reach)).sum()) + over * beyond / shaft
@@ -136,7 +136,7 @@ def supported(weight: Weight, stack: DirectStack, cage_n_per_m: float, metal: Sh
 
 def hanging(weight: Weight, stack: DirectStack, modulus_pa: float) -> Supported:
     """Return the load of a horn that carries alone: a cantilever up to the rigid hub, of this modulus."""
-    above_horn, thick = stack.slices(stack.hub_bottom - stack.horn, stack.waist_diameter)
+    above_horn, thick = stack.slices(stack.shoulder - stack.horn, stack.waist_diameter)
     outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
     moment = weight.across_n * (weight.lever_m - above_horn / 1000) + weight.along_n * weight.off_axis_m
     slope = float((moment * thick / 1000 / (modulus_pa * math.pi / 4 * (outer**4 - inner**4))).sum())
@@ -148,7 +148,8 @@ def shaft_bend(
 ) -> ShaftBend:
     """Return the compliance of the shaft at the hub.
 
-    Round sections or tubes (Timoshenko), clamped in the horn; a spring braces the bearing's sleeve sideways.
+    Round sections or tubes (Timoshenko), clamped in the horn; a spring braces it sideways at the bearing. A bearing's
+    sleeve, which is loose by its fit, does not stiffen it.
 
     Args:
         stack: its lengths and radii.
@@ -156,7 +157,7 @@ def shaft_bend(
         cage_n_per_m: sideways stiffness of the cage that holds the bearing, 0 without one.
         horn_rad_per_nm: how far a moment tilts the horn.
     """
-    length = (stack.hub_bottom - stack.horn) / 1000
+    length = (stack.shoulder - stack.horn) / 1000
     above_horn, thick = stack.slices(1000 * length, stack.waist_diameter)
     z, dz = above_horn / 1000, thick / 1000
     outer, inner = stack.radius_at(above_horn, stack.waist_diameter) / 1000, stack.bore_at(above_horn) / 1000
@@ -169,8 +170,13 @@ def shaft_bend(
         [[(bend * lever**2).sum() + shear, (bend * lever).sum()], [(bend * lever).sum(), bend.sum()]]
     )  # of force and moment at the end
     free += horn_rad_per_nm * np.array([[length**2, length], [length, 1.0]])
-    reach = np.array([1.0, (stack.bearing_middle - stack.hub_bottom) / 1000])  # the bearing moves by this
-    braced = np.outer(free @ reach, reach @ free) * cage_n_per_m / (1 + cage_n_per_m * float(reach @ free @ reach))
+    b = (stack.bearing_middle - stack.horn) / 1000  # of the bearing
+    reach = np.maximum(b - z, 0.0)
+    shear = float((dz / (SHEAR_SHARE * shear_pa * area))[z < b].sum())
+    there = np.array([(bend * reach * lever).sum() + shear, (bend * reach).sum()])  # of force and moment at the end
+    there += horn_rad_per_nm * b * np.array([length, 1.0])
+    own = float((bend * reach**2).sum()) + shear + horn_rad_per_nm * b**2  # of a force at the bearing
+    braced = np.outer(there, there) * cage_n_per_m / (1 + cage_n_per_m * own)
     return ShaftBend(
         compliance=free - braced,
         twist_rad_per_nm=float((dz / (shear_pa * 2 * second_moment)).sum()),

@@ -2,8 +2,8 @@
 
 Horn and bearing support the same shaft: misalignment bends its waist. Each tolerance is stated as the distance between
 the sleeve's middle and the bearing's; the worst case is their sum, added to the weight. Not counted: play of the seat,
-since the bearing is bonded while the shaft is in it; growth along the axis, since the sleeve slides in the inner ring.
-Runout of horn, flange and shaft is one number, trued at the shaft's upper end.
+since the cage is tightened while the shaft is in the bearing; growth along the axis, since the sleeve slides in the
+inner ring. Runout of horn, flange and shaft is one number, trued at the shaft's upper end.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from scanwright.cad.layout.loads import UNRATED_NM, Weight, rated_moment_nm
 from scanwright.design.scanner import Scanner
 
 TRUED_MM = 0.03  # on the indicator over a turn: the flange is tapped within the clearance of its screws
-SLEEVE_BOND_MM = 0.04  # largest runout of the sleeve against the shaft: clearance of its bore, and its own
+SLEEVE_MM = 0.04  # largest runout of the sleeve on the shaft: clearance of H7 on h6, and its own
 INNER_RING_MM = 0.013  # Kia of a bearing of the normal class, 18 to 30 mm, ISO 492
 SLEEVE_FIT_MM = 0.02  # largest clearance of g6 in the inner ring, on the diameter: ISO 286, ISO 492
 BEARING_CLEARANCE_MM = 0.02  # most radial clearance of the normal group, 24 to 30 mm, ISO 5753-1
@@ -44,7 +44,7 @@ def offsets_mm(ears: Ears) -> dict[str, float]:
     from_axis = abs(sum(y for _, y in ears.holes)) / len(ears.holes)
     return {
         f"shaft trued to {TRUED_MM:g} over a turn": TRUED_MM / 2,
-        "sleeve bonded to the shaft": SLEEVE_BOND_MM / 2,
+        "sleeve on the shaft": SLEEVE_MM / 2,
         "runout of the inner ring": INNER_RING_MM / 2,
         "sleeve in the inner ring": SLEEVE_FIT_MM / 2,
         "clearance of the bearing": BEARING_CLEARANCE_MM / 2,

@@ -7,8 +7,9 @@ ring's top, all fixed parts around the shaft stay below it: clearance over a tur
     z = 0             optical centre
     -h                top of the linkage's hub
     shoulder          the hub's height below: all that turns and is wider than the journal is above it
-    hub_bottom        the shoulder, or below it the lower end of the sleeve in a bearing
-    leads_low         HUB_GAP, or the height of the bend of its leads, below: the end of the ring's rotor collar
+    sleeve_low        the shoulder, or below it the lower end of the sleeve in a bearing
+    leads_low         below by SLEEVE_GAP; without a bearing by HUB_GAP, or the height of the bend of the ring's leads:
+                      the end of the ring's rotor collar
     ring_top          the collar's length below
     ring_bottom       the length of the ring's stator below
                       RING_GAP, or the shaft's waist, below: top of the shaft's collar
@@ -24,37 +25,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanwright.cad.layout.hub import HUB_GAP, Hub
+from scanwright.cad.layout.hub import HUB_GAP, SLEEVE_END, Hub
 from scanwright.cad.layout.names import HORN_CUP, SERVO_SHAFT
 from scanwright.design.arrays import Array
 
 RING_GAP = 3.0
 BELOW_HUB = 0.85  # between the hub, or its slotted tab, and a lead that leaves under it
+GROOVE_WIDTH, GROOVE_DEPTH = 2.6, 0.3  # of the shaft, for the flat points of the sleeve's grub screws
+SLEEVE_GAP = 4.5  # between a ring and the sleeve, whose channel its leads enter
 CUP_GAP = 0.5  # between hub and flange of a cup: the cup's rim carries the hub
 APART = 54.0  # least length of shaft between waist and hub: a bearing near the horn is no lever against it
-# DIN 471: bottom and width of the groove of a retaining ring, for whole diameters of shafts
-GROOVES = {
-    8: (7.6, 0.9),
-    9: (8.6, 1.1),
-    10: (9.6, 1.1),
-    11: (10.5, 1.1),
-    12: (11.5, 1.1),
-    13: (12.4, 1.1),
-    14: (13.4, 1.1),
-    15: (14.3, 1.1),
-    16: (15.2, 1.1),
-    17: (16.2, 1.1),
-    18: (17.0, 1.3),
-    19: (18.0, 1.3),
-    20: (19.0, 1.3),
-    21: (20.0, 1.3),
-    22: (21.0, 1.3),
-    24: (22.9, 1.3),
-}
 CAGE_MIN = 30.0  # least inner radius of the bearing's cage: heads of the servo's screws
 CAGE_WALL = 5.0
 CAGE_TIE = 2.0  # between ring and cage: a cable tie around the ring
-BEARING_SLACK = 0.3  # along the axis: space for the bond of the bearing
 CAGE_GAP = 1.0  # between hub and cage
 WINDOWS_REACH = 3.0  # of the cage's windows into its roof
 CAGE_SEAT_WALL = 4.0  # around the bearing
@@ -112,8 +95,8 @@ class DirectStack(Hub):
 
     @property
     def cage_seat(self) -> float:
-        """Height of the lip below the bearing, with its clearance."""
-        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm) - BEARING_SLACK
+        """Height of the lip below the bearing."""
+        return self.bearing_top - (0.0 if self.bearing is None else self.bearing.width_mm)
 
     @property
     def cage_roof(self) -> float:
@@ -134,7 +117,7 @@ class DirectStack(Hub):
     def leads_low(self) -> float:
         """Height of the upper end of the ring's rotor, where its leads leave."""
         bend = self.lead_radius + self.lead_diameter / 2 + BELOW_HUB
-        return self.hub_bottom - (max(HUB_GAP, bend) if self.bearing is None else HUB_GAP)
+        return self.sleeve_low - (max(HUB_GAP, bend) if self.bearing is None else SLEEVE_GAP)
 
     @property
     def ring_top(self) -> float:
@@ -157,9 +140,9 @@ class DirectStack(Hub):
         return self.ring_bottom - apart - self.waist_length - self.collar_height
 
     @property
-    def retaining_ring(self) -> int:
-        """Size of the ring that keeps the bearing's sleeve up: the shaft's, or the next smaller one."""
-        return max(size for size in GROOVES if size <= self.shaft_diameter)
+    def sleeve_grubs(self) -> float:
+        """Height of the grub screws that hold the sleeve in a bearing."""
+        return self.sleeve_low + SLEEVE_END / 2
 
     def radius_at(self, above_horn: Array, waist_diameter: float) -> Array:
         """Return the radius of the shaft at heights above the horn, without the pocket of the horn's boss.

@@ -6,9 +6,8 @@ Frame: rotation frame at gamma = 0 (`cad/layout/direct/stack.py`), mm. Two parts
                   the plate of `slip_ring_adapter`
     bearing_cage  a bell around ring and adapter: legs between windows, a roof of 45 deg, the bearing's seat
 
-Order: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell when the bearing
-is centred on the sleeve, and the bond in its seat last. The sleeve slides in the bearing: the horn alone carries axial
-loads.
+Order: shaft, base, ring and its tie, sleeve, bell with the bearing; the four radial screws of the bell last, when the
+bearing is centred on the sleeve. The sleeve slides in the bearing: the horn alone carries axial loads.
 """
 
 import math
@@ -28,14 +27,15 @@ from scanwright.cad.layout.direct.cage import (
     WINDOW_HALF_WIDTH,
     BearingCage,
 )
+from scanwright.cad.layout.direct.frame import OVER_HEADS
 from scanwright.cad.layout.direct.stack import CAGE_LIP, CAGE_SEAT_WALL, WINDOWS_REACH, DirectStack
 from scanwright.cad.layout.drive import Ears
 from scanwright.cad.layout.envelope import around_axis, box_corners
 from scanwright.cad.layout.joints import ALL_SCREWS, Joint, fixing_in, inward_axes, round_wall_mm, screws, upright_axes
 from scanwright.cad.layout.names import BEARING, BEARING_CAGE, CAGE_BASE, SLIP_RING_ADAPTER
 from scanwright.cad.layout.placement import Placement
-from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Row, Step, printed_seat
-from scanwright.cad.screws import Trap
+from scanwright.cad.parts.part_spec import ON_CASE, PartSpec, Step, printed_seat
+from scanwright.cad.screws import Screw, Trap
 from scanwright.cad.solids import building
 from scanwright.design.catalogue.servo import Servo
 
@@ -64,21 +64,23 @@ def bell_spec(place: Placement) -> PartSpec | None:
     )
     leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
     words = (
-        "Hold the axis upright; if the deck cannot be tilted, take the mount off it. Spread slow epoxy thinly in the "
-        f"seat, press the bearing in, {leads}and lower the cage "
-        f"over the sleeve onto its base. Put the screws of the cage in loosely: {ALL_SCREWS} Turn the shaft once "
-        "around by hand, so that the bearing centres on the sleeve, tighten the screws crosswise, turn once more, and "
-        "let the epoxy set before you load the shaft: it fills the gaps of the print."
+        f"Press the bearing into its seat, down to the lip, {leads}and lower the cage over the sleeve onto its base. "
+        f"Put the screws of the cage in loosely: {ALL_SCREWS} Turn the shaft once around by hand, so that the bearing "
+        "centres on the sleeve, tighten the screws crosswise, and turn it once more."
     )
     return PartSpec(
         name=BEARING_CAGE,
         turns=False,
         make=partial(bearing_cage, p),
-        step=Step("Bearing and cage", words, "the linkage's end of the shaft turns without a tight spot", (BEARING,)),
+        step=Step(
+            "Bearing and cage",
+            words,
+            "the bearing has no play in its seat, and the shaft turns without a tight spot",
+            (BEARING,),
+        ),
         fits=(printed_seat(p.bearing, p.fit),),
         joints=(joint,),
         avoid=(shape_of(around_axis(p.stack.cage_outer, p.low, p.stack.cage_top)),),
-        rows=(Row("consumable", "epoxy", "two-component epoxy, slow", "bearing in its printed seat"),),
     )
 
 
@@ -175,7 +177,10 @@ def cage_base(p: BearingCage) -> cq.Solid:
         cuts: list[cq.Shape] = [solids.upright(ears.opening, stack.horn + ears.front, p.high + 1.0)]
         for x, y in ears.holes:
             cuts.append(solids.upright(ears.hole / 2, seats - 1.0, p.high + 1.0, x, y))
-            cuts.append(head_recess(ears, x, y, p.low + UNDER_HEAD, p.high + 1.0))
+            cuts.append(head_recess(ears, ears.screw, x, y, p.low + UNDER_HEAD, p.high + 1.0))
+        for x, y, screw in ears.covers:
+            top = stack.horn + ears.front + screw.head_height + OVER_HEADS
+            cuts.append(head_recess(ears, screw, x, y, p.low - 1.0, top))
         for azimuth in p.legs:
             middle, start = (p.foot + p.high) / 2, stack.cage_inner - SCREW_DEPTH
             cuts.append(solids.radial(p.thread.hole / 2, azimuth, middle, start, SCREW_DEPTH + 1.0))
@@ -192,9 +197,9 @@ def _slot(p: BearingCage, trap: Trap, azimuth: float) -> cq.Solid:
     return slot.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(azimuth))
 
 
-def head_recess(ears: Ears, x: float, y: float, low: float, high: float) -> cq.Shape:
-    """Return the recess of one screw's head; next to the opening it is open, else a sliver would remain."""
-    radius = ears.screw.driver_radius
+def head_recess(ears: Ears, screw: Screw, x: float, y: float, low: float, high: float) -> cq.Shape:
+    """Return the recess of one screw's head; next to the opening it is open, since a sliver would remain."""
+    radius = screw.driver_radius
     recess: cq.Shape = solids.upright(radius, low, high, x, y)
     reach = math.hypot(x, y)
     if reach - radius > ears.opening + 1.0:

@@ -82,7 +82,7 @@ def drive_plate(stack: BeltStack, p: Ears, slot: float) -> cq.Solid:
             cuts.append(solids.upright(p.hole / 2, seats - 1.0, high + 1.0, x, y))
             radius, ends = p.screw.driver_radius, (low + UNDER_HEAD, high + 1.0)
             cuts.append(
-                head_recess(p, x, y, *ends)
+                head_recess(p, p.screw, x, y, *ends)
                 if math.hypot(x, y) - radius > p.opening
                 else solids.upright(radius, *ends, x, y)
             )

@@ -59,7 +59,7 @@ def main_shaft_spec(place: Placement) -> PartSpec | None:
 
 def main_shaft(stack: BeltStack) -> cq.Solid:
     """Make the shaft."""
-    radius, top = stack.shaft_diameter / 2, stack.hub_bottom - UNDER_HUB
+    radius, top = stack.shaft_diameter / 2, stack.shoulder - UNDER_HUB
     with building(MAIN_SHAFT, "body", "shaft diameter", f"{stack.tube_diameter:g} mm") as checked:
         body: cq.Shape = solids.upright(stack.seat_diameter / 2, stack.shaft_bottom, top)
         collar = solids.upright(stack.collar_radius, stack.tower_top, stack.teeth_low)
@@ -69,7 +69,7 @@ def main_shaft(stack: BeltStack) -> cq.Solid:
         cuts = [
             solids.upright(stack.shaft_bore / 2, stack.shaft_bottom - 1.0, end),
             solids.cylinder(WINDOW / 2, (-stack.tube_diameter, 0.0, end - WINDOW / 2), (1.0, 0.0, 0.0), 99.0),
-            solids.box((-2 * radius, stack.flat, stack.hub_bottom), (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
+            solids.box((-2 * radius, stack.flat, stack.shoulder), (2 * radius, 2 * radius, stack.spigot_top + 1.0)),
             *cross_holes(stack),
         ]
         for azimuth in RING_SCREWS_DEG:

@@ -13,7 +13,7 @@ import cadquery as cq
 from scanwright.cad import outlines, solids
 from scanwright.cad.layout.direct.loads import ALUMINIUM, STEEL
 from scanwright.cad.layout.direct.misalignment import TRUED_MM
-from scanwright.cad.layout.direct.stack import GROOVES, DirectStack
+from scanwright.cad.layout.direct.stack import GROOVE_DEPTH, GROOVE_WIDTH, DirectStack
 from scanwright.cad.layout.hub import Hub
 from scanwright.cad.layout.joints import Joint, horn_centres, horn_joint, screws
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, SERVO_HORN, SERVO_SHAFT
@@ -51,7 +51,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         return None
     fits = (spigot_in_hub(stack.shaft_diameter, scanner.printer.fit_clearance_mm),)
     if stack.bearing is not None:
-        fits = (ToleratedDiameter(stack.shaft_diameter, False, "0/-0.011", "h6, the bearing's sleeve is bonded to it"),)
+        fits = (ToleratedDiameter(stack.shaft_diameter, False, "0/-0.011", "h6, the bearing's sleeve slides on it"),)
     words = (
         f"{to_centre(scanner.servo)} Put the flange of the shaft on the horn so "
         "that its index groove points to the servo's +Y face, the end of the case nearest to the horn. "
@@ -136,23 +136,21 @@ def _waist(stack: DirectStack) -> cq.Solid:
 
 
 def _groove(stack: DirectStack) -> cq.Solid:
-    """Return the groove of the retaining ring under the bearing's sleeve."""
-    bottom, width = GROOVES[stack.retaining_ring]
-    high, outer = stack.hub_bottom, stack.shaft_diameter
-    return solids.lathe(
-        [[outer, high - width], [bottom / 2, high - width], [bottom / 2, high], [outer, high]],
-    )
+    """Return the groove for the points of the sleeve's grub screws: it places the sleeve, and hides their marks."""
+    low, high = stack.sleeve_grubs - GROOVE_WIDTH / 2, stack.sleeve_grubs + GROOVE_WIDTH / 2
+    bottom, outer = stack.shaft_diameter / 2 - GROOVE_DEPTH, stack.shaft_diameter
+    return solids.lathe([[outer, low], [bottom, low], [bottom, high], [outer, high]])
 
 
 def _waist_words(stack: DirectStack) -> tuple[str, ...]:
     """Return the notes of the sheet on waist and groove."""
     if stack.bearing is None:
         return ()
-    bottom, width = GROOVES[stack.retaining_ring]
     in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_diameter:.2f}"
     return (
         f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}. No other metal is flexible "
         "and strong enough.",
-        f"Groove \u00d8{bottom:g} 0/-0.1, {width:g} +0.14/0 wide, for DIN 471 - {stack.retaining_ring}.",
+        f"Groove {GROOVE_WIDTH:g} wide and {GROOVE_DEPTH:g} deep, its middle {stack.spigot_top - stack.sleeve_grubs:g} "
+        "below the end of the spigot, for the points of grub screws.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",
     )

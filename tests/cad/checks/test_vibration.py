@@ -85,7 +85,7 @@ def test_a_printed_post_swings_with_its_own_mass_as_a_beam_does():
 
 def test_a_horn_that_tilts_and_seats_that_give_way_add_to_the_shaft(made):
     stack = replace(made.result.assembly.layout.stack, bearing=None)
-    length = (stack.hub_bottom - stack.horn) / 1000
+    length = (stack.shoulder - stack.horn) / 1000
     stiff, soft = shaft_bend(stack).compliance, shaft_bend(stack, horn_rad_per_nm=1e-3).compliance
     np.testing.assert_allclose(soft - stiff, 1e-3 * np.array([[length**2, length], [length, 1.0]]))
 

@@ -31,6 +31,7 @@ from scanwright.cad.layout.tightening import ALUMINIUM as METAL
 from scanwright.cad.layout.tightening import BOUGHT, MOULDED, PRINTED, hold_of
 from scanwright.cad.parts.all_parts import laid_out, parts_of
 from scanwright.cad.parts.shafts.servo_shaft import on_horn
+from scanwright.cad.screws import SCREWS
 from scanwright.design.catalogue.catalogue import load_catalogue
 from scanwright.design.catalogue.holes import Hole
 from scanwright.design.catalogue.products import Bearing
@@ -359,14 +360,23 @@ def test_where_a_fork_finds_no_holes_the_base_of_a_cage_does(servo, beta_rot):
         laid_out(replace(scanner, bearings=()))
 
 
-def test_a_cage_is_wide_enough_for_the_boss_around_its_opening():
-    """The heads of the frame's screws needed a wider opening than the cage: no boss, and 6 screws without a hole."""
-    scanner = scanner_at((29.6, -39.2, -84.4, 0.3), sensor="TiM551", servo="STS3215", slip_ring=None)
+@pytest.mark.parametrize(("servo", "lidar"), [("STS3215", "TiM551"), ("XL430-W250", "UTM-30LX")])
+def test_the_base_of_a_cage_stands_on_its_four_feet_over_the_heads_of_a_frame(servo, lidar):
+    """An opening that left all these heads free had two of the feet in it, and a nut without a wall around it."""
+    scanner = scanner_at((29.6, -39.2, -84.4, 0.3), sensor=lidar, servo=servo, slip_ring=None, printer="fdm-0.4-nut")
     assembly = make_parts(scanner, lambda spec: spec.name == "cage_base")
     cage, base = assembly.layout.drive.of(BearingCage), assembly.made["cage_base"]
-    middle, wall = (cage.foot + cage.high) / 2, cage.stack.cage_inner - cage.ears.opening
-    assert wall >= 6.0
-    free = np.radians(np.arange(0.0, 360.0, 1.0))
-    radius = cage.stack.cage_inner - wall / 2
-    inside = [base.isInside(cq.Vector(radius * np.cos(a), radius * np.sin(a), middle)) for a in free]
-    assert np.mean(inside) > 0.6  # windows and holes are the rest
+    ears, seats = cage.ears, cage.stack.horn + cage.ears.seats
+    assert cage.stack.cage_inner - ears.opening > 8.0 - 1e-9
+
+    def is_solid(x, y, z):
+        return base.isInside(cq.Vector(x, y, z))
+
+    around = np.radians(np.arange(0.0, 360.0, 30.0))
+    for x, y in ears.holes:
+        assert not is_solid(x, y, seats + 1.0)
+        assert all(is_solid(x + 2.3 * np.cos(a), y + 2.3 * np.sin(a), seats + 0.5) for a in around)
+    head = SCREWS[scanner.servo.front.screw]
+    for x, y in scanner.servo.front.places:
+        for z in (0.3, head.head_height + 0.3):
+            assert not any(is_solid(x + 2.2 * np.cos(a), y + 2.2 * np.sin(a), seats + z) for a in around)

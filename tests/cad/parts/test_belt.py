@@ -208,7 +208,7 @@ def test_the_servo_slides_far_enough_to_put_the_belt_on_and_to_tighten_it(made):
 def test_index_grooves_of_hub_and_tower_lie_at_plus_y_whatever_the_servos_side(made):
     stack = made.stack
     outlines = [
-        section(made.meshes["alignment_linkage"], stack.hub_bottom + 1.0),
+        section(made.meshes["alignment_linkage"], stack.shoulder + 1.0),
         section(made.meshes["bearing_tower"], stack.tower_top - 1.0),
     ]
     for quarter in set(QUARTERS) - {stack.quarter}:
@@ -242,7 +242,7 @@ def test_leads_pass_from_the_capsule_to_below_the_hub(made):
     shaft = made.meshes["main_shaft"]
     up = shaft.ray.intersects_location([[0, 0, stack.ring_top + 1]], [[0, 0, 1.0]])[0][:, 2]
     window = up.min() - 4.0
-    assert stack.pulley_top < window < stack.hub_bottom
+    assert stack.pulley_top < window < stack.shoulder
     for direction in ([1.0, 0, 0], [-1.0, 0, 0]):
         for mesh in (mesh for name, mesh in made.meshes.items() if not name.startswith(ROTOR_LEAD)):
             assert not len(mesh.ray.intersects_location([[0, 0, window]], [direction])[0])
@@ -279,7 +279,7 @@ def test_the_shaft_bends_as_unit_loads_say(made):
     stack = made.stack
     EI = 70e9 * np.pi / 64 * (0.025**4 - 0.0128**4)
     span = (stack.upper_middle - stack.lower_middle) / 1000
-    over = (stack.hub_bottom - stack.upper_middle) / 1000
+    over = (stack.shoulder - stack.upper_middle) / 1000
     x = (np.arange(20000) + 0.5) / 20000 * (span + over)
     dx = (span + over) / 20000
     beyond = span + over - x

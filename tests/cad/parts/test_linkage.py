@@ -73,7 +73,7 @@ HARD = [  # where the prototypes broke: slivers, lost necks, cable pockets, hidd
 ]
 
 
-@pytest.mark.parametrize(("alpha", "beta", "lidar"), samples(HARD, [HARD[0], HARD[3], HARD[5], HARD[6]]))
+@pytest.mark.parametrize(("alpha", "beta", "lidar"), samples(HARD, [HARD[0], HARD[6]]))
 def test_hard_angles_give_one_closed_body_that_holds_the_lidar_on_the_axis(alpha, beta, lidar):
     scanner = scanner_for(alpha, beta, lidar)
     stack = drive_of(scanner).stack
@@ -173,8 +173,8 @@ def test_lidar_cables_and_plate_stay_above_the_hubs_lower_face(alpha, beta):
     assert stack.sub_plate is not None or covered_screws(scanner.lidar, stack) == []
     envelope = envelope_of(scanner.lidar)
     boxes = (envelope.body, *envelope.cables, envelope.plate(stack.sub_plate), envelope.under(stack.sub_plate))
-    assert min((box_corners(box) @ stack.R()[2]).min() for box in boxes) >= stack.hub_bottom + 0.99
-    assert stack.spigot_top > stack.hub_bottom > stack.ring_top > stack.ring_bottom > stack.horn
+    assert min((box_corners(box) @ stack.R()[2]).min() for box in boxes) >= stack.shoulder + 0.99
+    assert stack.spigot_top > stack.shoulder > stack.ring_top > stack.ring_bottom > stack.horn
 
 
 @settings(deadline=None)
