@@ -42,8 +42,8 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     )
     channel = channel_azimuth(place.linkage)
     words = (
-        f"Slide the sleeve onto the shaft, its threads downwards{leads}. When they are over the groove of the shaft, "
-        f"the end of the sleeve is just below the flat. {screws(SERVO_SHAFT)}"
+        f"Slide the sleeve onto the shaft, its threads downwards{leads}. With its upper end just below the "
+        f"flat, its grub screws are over the groove of the shaft. {screws(SERVO_SHAFT)}"
     )
     seat = ToleratedDiameter(stack.bearing.bore_mm - SLIDES, False, "+0.013/0", f"g6, slides in {stack.bearing.name}")
     bore = ToleratedDiameter(stack.shaft_diameter + LOOSE, True, "+0.008/-0.01", "H7 on the shaft")
