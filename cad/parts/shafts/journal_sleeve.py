@@ -12,7 +12,7 @@ import cadquery as cq
 
 from scanwright.cad import solids
 from scanwright.cad.layout.direct.stack import GROOVE_DEPTH, DirectStack
-from scanwright.cad.layout.hub import BEARING_STEP, JOURNAL_WALL, SLEEVE_END
+from scanwright.cad.layout.hub import BEARING_STEP, JOURNAL_WALL
 from scanwright.cad.layout.joints import Joint, inward_axes, round_wall_mm, screws
 from scanwright.cad.layout.names import JOURNAL_SLEEVE, SERVO_SHAFT
 from scanwright.cad.layout.placement import Placement
@@ -58,10 +58,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         material=TURNED_FROM,
         why_metal=f"{stack.bearing.name} needs a round seat to g6",
         fits=(seat, bore),
-        notes=(
-            "Bore and outside in one setting: runout 0.01.",
-            f"2 x {GRUB.name} through the wall, 90 deg apart, {SLEEVE_END / 2:g} above the lower end.",
-        ),
+        notes=("Bore and outside in one setting: runout 0.01.",),
         joints=(
             Joint(
                 JOURNAL_SLEEVE,
