@@ -7,7 +7,7 @@ import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.access import Body, circle
-from scanwright.cad.checks.table import SEATED_SHARE
+from scanwright.cad.checks.table import SEATED_SHARE, SLOT_SHARE
 from scanwright.cad.layout.joints import Joint
 from scanwright.cad.screws import passing_hole
 from scanwright.design.arrays import Array
@@ -19,21 +19,19 @@ BAND_MM = 1.0  # above and below the place of a head: seats of washers, and roun
 
 def seat_checks(assembly: Assembly) -> list[Finding]:
     """Return an error for each joint with a screw without hole or seat in its part; if there is none, one finding."""
-    findings, least = list[Finding](), 1.0
+    findings = []
     for joint in assembly.layout.joints:
         if joint.part not in assembly.made or joint.fixing == "grub":
             continue
-        body, hole_mm = Body(assembly.mesh(joint.part)), passing_hole(joint.screw, assembly.layout.scanner.printer)
-        for number, share in enumerate(seat_shares(joint, body, hole_mm), start=1):
-            least = min(least, float(share))
-            if share < SEATED_SHARE:
-                message = (
-                    f"{joint.part} on {joint.onto}: screw {number} of {joint.count} {joint.screw.name} has "
-                    f"{f'{share:.0%} of the seat of its head' if share else 'no hole, or no seat for its head'}"
-                )
-                findings.append(Finding("screw_seat", "error", joint.part, message, float(share), SEATED_SHARE))
+        hole_mm = passing_hole(joint.screw, assembly.layout.scanner.printer)
+        shares = seat_shares(joint, Body(assembly.mesh(joint.part)), hole_mm)
+        without = np.flatnonzero(shares < (SEATED_SHARE if joint.slot_mm is None else SLOT_SHARE))
+        if len(without):
+            found = f"{shares.min():.0%} of the seat of its head" if shares.min() > 0 else "no hole, or no seat"
+            message = f"{joint.part} on {joint.onto}: {len(without)} of {joint.count} {joint.screw.name}: {found}"
+            findings.append(Finding("screw_seat", "error", joint.part, message, float(len(without)), 0.0))
     message = "screws: every head has a hole in its part, and material around it"
-    return findings or [Finding("screw_seat", "ok", "screws", message, least, SEATED_SHARE)]
+    return findings or [Finding("screw_seat", "ok", "screws", message, 0.0, 0.0)]
 
 
 def seat_shares(joint: Joint, body: Body, hole_mm: float) -> Array:
