@@ -81,7 +81,7 @@ TABLE = (
     CheckRow(
         "waist_torque", "stall torque on the shaft's waist", "yield of aluminium and of steel", "EN 755-2, EN ISO 683-2"
     ),
-    CheckRow("shaft_slope", "bend of the shaft at the hub", NOISE, "catalogue"),
+    CheckRow("shaft_slope", "bend of the shaft at the hub, which `deflection` includes"),
     CheckRow(
         "retention", "each joint under a shock", f"margin {LEAST_MARGIN:g} at {SHOCK_G:g} g; error below 1", "assumed"
     ),
@@ -137,7 +137,6 @@ CHANGES = {
     "bearing_load": LIGHTER,
     "belt_tension": f"take a longer period_s in [motion], a ring with a bore (slip_ring), or {LIGHTER}",
     "waist_torque": "choose a servo with a smaller stall torque (servo)",
-    "shaft_slope": f"{LIGHTER} or a shorter ring (slip_ring)",
     "retention": "if a printed part yields, choose a printer profile with nuts or inserts (printer); otherwise a servo "
     "with metal threads (servo), or a lighter lidar (sensor)",
     "angle_held": f"{LIGHTER}, or {OTHER_MOUNT}",
@@ -145,7 +144,7 @@ CHANGES = {
     "wiring": "correct the value in the catalogue file, or choose another device",
     "lead_bend": LEADS,
     "lead_joint": LEADS,
-    "deflection": STIFFER,
+    "deflection": f"{STIFFER}, or a shorter ring (slip_ring)",
     "deflection_turning": STIFFER,
     "mount_lean": "correct the holes in [deck] of the task",
     "bed": "choose a printer with a larger bed (printer), or other [angles]",

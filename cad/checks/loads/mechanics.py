@@ -37,7 +37,7 @@ def direct_loads(layout: Placement, weight: Weight) -> list[Finding]:
     if stack is None:
         return []
     shared = share_weight(scanner, stack, cage, weight)
-    return [*_forces(scanner, stack, cage, weight, shared), *_yields(scanner, stack), _slope(scanner, stack, shared)]
+    return [*_forces(scanner, stack, cage, weight, shared), *_yields(scanner, stack), _slope(stack, shared)]
 
 
 def _forces(
@@ -90,11 +90,11 @@ def _yields(scanner: Scanner, stack: DirectStack) -> list[Finding]:
     ]
 
 
-def _slope(scanner: Scanner, stack: DirectStack, shared: Supported) -> Finding:
-    """Check the tilt of the axis by gravity: a constant error of the mount, the same in every position."""
+def _slope(stack: DirectStack, shared: Supported) -> Finding:
+    """Return the tilt of the axis by gravity: the part of `deflection` that the shaft has in it."""
     at_10_m = math.tan(shared.slope_rad) * FAR_MM
-    what = f"bend of the shaft at the hub ({at_10_m:.1f} mm at 10 m)"
-    return at_most("shaft_slope", math.degrees(shared.slope_rad), noise_deg(scanner), "deg", stack.shaft, what)
+    what = f"bend of the shaft at the hub ({at_10_m:.1f} mm at 10 m), which `deflection` includes"
+    return note("shaft_slope", math.degrees(shared.slope_rad), "deg", stack.shaft, what)
 
 
 def belt_loads(layout: Placement, rotor: Inertial, weight: Weight, torque: float) -> list[Finding]:
