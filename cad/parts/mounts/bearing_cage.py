@@ -62,9 +62,10 @@ def bell_spec(place: Placement) -> PartSpec | None:
         thread_mm=SCREW_DEPTH - p.fit / 2 if p.thread.trap is None else TRAP_WALL,
         thread=p.thread,
     )
-    leads = "pass the plugs of the ring's leads up through it, " if place.scanner.slip_ring else ""
+    leads = "pass the plugs of the ring's leads up through it and " if place.scanner.slip_ring else ""
     words = (
-        f"Press the bearing into its seat, down to the lip, {leads}and lower the cage over the sleeve onto its base. "
+        "Press the bearing into its seat, down to the lip; if it is loose there, print the cage with a smaller "
+        f"fit_clearance_mm. Then {leads}lower the cage over the sleeve onto its base. "
         f"Put the screws of the cage in loosely: {ALL_SCREWS} Turn the shaft once around by hand, so that the bearing "
         "centres on the sleeve, tighten the screws crosswise, and turn it once more."
     )

@@ -42,7 +42,7 @@ def test_no_mount_of_a_fine_grid_sees_all_and_is_much_better(heading_deg, height
     found = search(problem, task.angles).best[0]
     assert found.score.blind_weight == 0
     space = SearchSpace(problem, task.angles, Limits(), avoid_holes=True)
-    fine = [np.array([0.0, 0.0, a, b]) for a in np.arange(-60, 61, 4.0) for b in np.arange(40, 61, 4.0)]
+    fine = [np.array([0.0, 0.0, a, b]) for a in np.arange(-60, 61, 6.0) for b in np.arange(40, 61, 5.0)]
     seeing = [space.score(setting) for setting in fine if np.isfinite(space.J(setting, 243))]
     assert len(seeing) > 3
     assert found.score.J < min(each.J for each in seeing if each is not None) + 0.01
