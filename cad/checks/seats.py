@@ -1,6 +1,6 @@
-"""Whether the head of every screw has a hole under it and material around that hole, by rays on the parts' meshes.
+"""Whether every screw has a hole through its part with material under the head, and one with material in what it holds.
 
-A joint is a record and the cuts of its part are another: this check finds where they do not agree.
+A joint is a record and the cuts of the parts are others: this check finds where they do not agree. By rays on meshes.
 """
 
 import numpy as np
@@ -14,40 +14,53 @@ from scanwright.design.arrays import Array
 from scanwright.design.findings import Finding
 from scanwright.design.scene.ray_caster import cast
 
-BAND_MM = 1.0  # above and below the place of a head: seats of washers, and round ones
+HEAD_MM, THREAD_MM = 1.0, 2.0  # above and below a face: seats of washers, and round shafts with a flat
+WALL_MM = 0.6  # from a thread's hole to the circle on which its face is looked for
+FREE_MM = 2.0  # least depth of such a hole
 
 
 def seat_checks(assembly: Assembly) -> list[Finding]:
-    """Return an error for each joint with a screw without hole or seat in its part; if there is none, one finding."""
+    """Return an error for each joint with a screw without hole or face in a part; if there is none, one finding."""
     findings = []
     for joint in assembly.layout.joints:
-        if joint.part not in assembly.made or joint.fixing == "grub":
+        if joint.fixing == "grub":
             continue
+        enough = SEATED_SHARE if joint.slot_mm is None else SLOT_SHARE
         hole_mm = passing_hole(joint.screw, assembly.layout.scanner.printer)
-        shares = seat_shares(joint, Body(assembly.mesh(joint.part)), hole_mm)
-        without = np.flatnonzero(shares < (SEATED_SHARE if joint.slot_mm is None else SLOT_SHARE))
-        if len(without):
-            found = f"{shares.min():.0%} of the seat of its head" if shares.min() > 0 else "no hole, or no seat"
-            message = f"{joint.part} on {joint.onto}: {len(without)} of {joint.count} {joint.screw.name}: {found}"
-            findings.append(Finding("screw_seat", "error", joint.part, message, float(len(without)), 0.0))
-    message = "screws: every head has a hole in its part, and material around it"
+        head_mm = (hole_mm + joint.screw.head_diameter) / 2  # the middle of what bears
+        thread_mm = (joint.screw.core if joint.thread is None else joint.thread.hole) + 2 * WALL_MM
+        for part, circle_mm, at_mm, band_mm, free_mm, least in (
+            (joint.part, head_mm, 0.0, HEAD_MM, joint.grip_mm, enough),
+            (joint.onto, thread_mm, joint.grip_mm, THREAD_MM, min(FREE_MM, joint.thread_mm), SEATED_SHARE),
+        ):
+            if part in assembly.made:
+                shares = face_shares(joint, Body(assembly.mesh(part)), circle_mm, at_mm, band_mm, free_mm)
+                if (missing := int((shares < least).sum())) > 0:
+                    found = f"{shares.min():.0%} of a face around its hole" if shares.min() > 0 else "no hole"
+                    which = f"{missing} of {joint.count} {joint.screw.name}"
+                    message = f"{joint.part} on {joint.onto}: {which}: {found} in {part}"
+                    findings.append(Finding("screw_seat", "error", part, message, float(missing), 0.0))
+    message = "screws: every one has its holes, and material around them"
     return findings or [Finding("screw_seat", "ok", "screws", message, 0.0, 0.0)]
 
 
-def seat_shares(joint: Joint, body: Body, hole_mm: float) -> Array:
-    """Return for each screw of a joint the share of its head that bears on a body; 0 if the body closes the hole.
+def face_shares(joint: Joint, body: Body, circle_mm: float, at_mm: float, band_mm: float, free_mm: float) -> Array:
+    """Return for each screw of a joint the share of a circle around it that is on a face; 0 if its hole is closed.
 
     Args:
         joint: the screws.
-        body: that the heads bear on.
-        hole_mm: diameter of the holes.
+        body: with the face.
+        circle_mm: diameter of the circle.
+        at_mm: distance of the face from the place of the head.
+        band_mm: by which the face may be higher or lower.
+        free_mm: least depth of the hole below the face.
     """
-    radius = (hole_mm + joint.screw.head_diameter) / 4  # the middle of what bears
     shares = []
     for axis in joint.axes:
         along = np.array(axis.along)
-        starts = axis.start - BAND_MM * along + np.concatenate([np.zeros((1, 3)), circle(along, radius)])
+        around = np.concatenate([np.zeros((1, 3)), circle(along, circle_mm / 2)])
+        starts = axis.start + (at_mm - band_mm) * along + around
         hits_mm = 1000 * cast(body.scene, starts / 1000, np.broadcast_to(along, starts.shape)).range_m
-        closed = hits_mm[0] < BAND_MM + joint.grip_mm
-        shares.append(0.0 if closed else np.mean(hits_mm[1:] < 2 * BAND_MM))
+        closed = hits_mm[0] < band_mm + free_mm
+        shares.append(0.0 if closed else np.mean(hits_mm[1:] < 2 * band_mm))
     return np.array(shares)

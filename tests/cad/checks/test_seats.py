@@ -1,4 +1,4 @@
-"""The head of a screw bears on its part: a part without hole, with an opening there, or elsewhere, is an error."""
+"""A part without a screw's hole, with an opening there, or elsewhere, is an error, on both sides of a joint."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 
 from scanwright.cad import solids
 from scanwright.cad.checks.access import Body
-from scanwright.cad.checks.seats import seat_checks, seat_shares
+from scanwright.cad.checks.seats import face_shares, seat_checks
 from scanwright.cad.geometry.mesh import mesh_of
 from scanwright.cad.layout.joints import Joint, ScrewAxis
 from scanwright.cad.screws import SCREWS
@@ -45,7 +45,8 @@ def test_the_share_of_a_seat_is_that_of_the_material_under_the_head(name, turn_d
     z = 4.5 if "recess" in name else 5.0
     joint = Joint("plate", "block", "thread", SCREWS["M3"], (ScrewAxis(tuple(R @ (0, 0, z)), tuple(-R[:, 2])),), z, 8.0)
     body = Body(mesh_of(solid.moved(solids.location(R, np.zeros(3)))))
-    assert seat_shares(joint, body, HOLE_MM) == pytest.approx(expected, abs=0.09)
+    middle_mm = (HOLE_MM + SCREWS["M3"].head_diameter) / 2
+    assert face_shares(joint, body, middle_mm, 0.0, 1.0, z) == pytest.approx(expected, abs=0.09)
 
 
 def test_a_screw_of_a_build_without_seat_is_an_error_that_counts_it(made):
@@ -55,6 +56,8 @@ def test_a_screw_of_a_build_without_seat_is_an_error_that_counts_it(made):
     cage = next(joint for joint in assembly.layout.joints if joint.part == "bearing_cage")
     aside = replace(cage.axes[1], start=tuple(np.add(cage.axes[1].start, (0, 0, 9.0))))
     moved = replace(cage, axes=(cage.axes[0], aside, *cage.axes[2:]))
-    (check,) = seat_checks(replace(assembly, layout=replace(assembly.layout, joints=(moved,))))
-    assert check.severity == "error" and check.value == 1.0
-    assert "bearing_cage on slip_ring_adapter: 1 of 4 M3: " in check.message
+    found = seat_checks(replace(assembly, layout=replace(assembly.layout, joints=(moved,))))
+    assert [(check.severity, check.subject, check.value) for check in found] == [
+        ("error", part, 1.0) for part in ("bearing_cage", "slip_ring_adapter")
+    ]
+    assert all("bearing_cage on slip_ring_adapter: 1 of 4 M3: " in check.message for check in found)
