@@ -36,7 +36,11 @@ def seat_checks(assembly: Assembly) -> list[Finding]:
             if part in assembly.made:
                 shares = face_shares(joint, Body(assembly.mesh(part)), circle_mm, at_mm, band_mm, free_mm)
                 if (missing := int((shares < least).sum())) > 0:
-                    found = f"{shares.min():.0%} of a face around its hole" if shares.min() > 0 else "no hole"
+                    found = (
+                        f"{shares.min():.0%} of a face around its hole"
+                        if shares.min() > 0
+                        else "no hole, or no face around it,"
+                    )
                     which = f"{missing} of {joint.count} {joint.screw.name}"
                     message = f"{joint.part} on {joint.onto}: {which}: {found} in {part}"
                     findings.append(Finding("screw_seat", "error", part, message, float(missing), 0.0))
