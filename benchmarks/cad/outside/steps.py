@@ -12,7 +12,7 @@ SCREWS = re.compile(
     r"(?:from (?P<from>\w+) into (?P<into>\w+)"
     r"|from (?P<lifts>\w+) onto \d+ nuts? [^,]+ in (?P<trap>\w+)"
     r"|through the (?P<foot>foot) into the deck, with .*?"
-    r"|through (?P<through>\w+) into (?P<case>\w+), with \d+ nuts? \S+"
+    r"|through (?P<through>\w+) into (?P<case>\w+), with \d+ nuts? \S+(?: in the slots of the case)?"
     r"|in (?P<grub>\w+), against (?P<against>\w+))"
     r"(?P<insert>, in heat-set inserts|, through [^,]* in its bore)?, (?:[\d.]+ N m|hand-tight)\.\*\*"
 )
