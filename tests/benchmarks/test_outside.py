@@ -126,3 +126,8 @@ def test_it_shares_no_code_with_the_package():
     for file in Path(outside.__file__).parent.glob("*.py"):
         for line in re.findall(r"^\s*(?:from|import) (\S+)", file.read_text(encoding="utf-8"), re.MULTILINE):
             assert line.split(".")[0] not in ("scanwright", "design", "cad", "firmware_io"), f"{file.name}: {line}"
+
+
+def test_every_screw_in_the_steps_of_a_build_is_understood(made):
+    steps = steps_of((made.folder / "assembly.md").read_text("utf-8"))
+    assert sum(len(step.screws) for step in steps) == len(made.result.assembly.layout.joints)
