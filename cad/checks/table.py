@@ -45,7 +45,7 @@ TABLE = (
     ),
     CheckRow(
         "screw_seat",
-        "share of every screw's head that has material under it, around a hole",
+        "hole of every screw on both sides, and share of the faces around it",
         f"at least {SEATED_SHARE:.0%}, over a slot {SLOT_SHARE:.0%}",
         "chosen",
     ),

@@ -263,7 +263,7 @@ def _laid(
         bundle, path, half = bundles[i], None, bundles[i].half
         start = outlet_mm(place, outlets[i], place.scanner.lidar.cable_straight_mm)
         outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
-        exits = place.drive.lead_exits(bundle, linkage.hub_tie, sum(linkage.cross_azimuths) / 2)
+        exits = place.drive.lead_exits(bundle, linkage.hub_tie, linkage.free_azimuth)
         # tied if possible; a path in the fan, where its shadow counts, is better than none
         for within, (tie, ends) in product((space, replace(space, bearings_rad=None)), exits):
             starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in ends]

@@ -85,6 +85,11 @@ class AlignmentLinkage:
     hub_tie: TieSeat | None = None  # rotation frame
     plate_ties: tuple[TieSeat, ...] = ()  # laser frame
 
+    @property
+    def free_azimuth(self) -> float:
+        """Azimuth [rad] between the two cross screws, where the leads of a ring leave."""
+        return sum(self.cross_azimuths) / 2
+
 
 def linkage_body_of(scanner: Scanner, envelope: Envelope, stack: Hub) -> AlignmentLinkage:
     """Return the linkage of one scanner, before anything is attached.

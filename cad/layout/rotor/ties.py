@@ -78,7 +78,7 @@ def _without(which: str, why: str) -> LeftOut:
 
 def _candidates(p: AlignmentLinkage, ear: Ear | None) -> Iterator[TieSeat]:
     """Yield seats between the cross screws; if the leads do not leave by a sleeve, on the other sides too."""
-    stack, free = p.stack, sum(p.cross_azimuths) / 2
+    stack, free = p.stack, p.free_azimuth
     wired = stack.bearing is not None
     low = stack.leads_corner + stack.lead_diameter / 2 + OVER_LEADS if wired else stack.shoulder
     for turn in (0.0,) if wired else (0.0, math.pi / 2, -math.pi / 2, math.pi):

@@ -100,12 +100,7 @@ def _wires(p: AlignmentLinkage) -> list[cq.Solid]:
     if p.hub_tie is not None:  # lower at the tie of the leads
         ends = [(stack.hub_radius - IN_HUB, roof), (out, p.hub_tie.low)]
     channels = [solids.box(low, (end, half, high)) for end, high in ends]
-    return [each.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(_free_side(p))) for each in channels]
-
-
-def _free_side(p: AlignmentLinkage) -> float:
-    """Return the azimuth between the two cross screws."""
-    return sum(p.cross_azimuths) / 2
+    return [each.rotate(cq.Vector(0, 0, 0), cq.Vector(0, 0, 1), math.degrees(p.free_azimuth)) for each in channels]
 
 
 def _crossed(p: AlignmentLinkage) -> list[cq.Solid]:
@@ -131,7 +126,7 @@ def _index_groove(p: AlignmentLinkage) -> cq.Solid:
     """Return a groove at the hub's lower end, above the wires if they leave at +y, or in an ear there."""
     stack, ear, y = p.stack, p.ear, p.stack.hub_radius
     low, high = stack.shoulder - 1.0, stack.shoulder + 4.0
-    if stack.journal > 0 and math.cos(_free_side(p) - math.pi / 2) > 0.9:
+    if stack.journal > 0 and math.cos(p.free_azimuth - math.pi / 2) > 0.9:
         low, high = -stack.h - 5.0, -stack.h + 1.0
         if ear is not None and _reach_along_y(ear) > y:
             y, low, high = _reach_along_y(ear), ear.low - 1.0, ear.high + 1.0

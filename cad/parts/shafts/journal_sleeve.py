@@ -40,7 +40,7 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
         if place.scanner.slip_ring
         else ""
     )
-    channel = channel_azimuth(place.linkage)
+    channel = place.linkage.free_azimuth  # as that of the hub above it
     words = (
         f"Slide the sleeve onto the shaft, its threads downwards{leads}. With its upper end just below the "
         f"flat, its grub screws are over the groove of the shaft. {screws(SERVO_SHAFT)}"
@@ -74,11 +74,6 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     )
 
 
-def channel_azimuth(p: AlignmentLinkage) -> float:
-    """Return the azimuth [rad] of the channel for the leads: that of the hub above it."""
-    return sum(p.cross_azimuths) / 2
-
-
 def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
     """Make the sleeve."""
     assert stack.bearing is not None
@@ -88,7 +83,7 @@ def journal_sleeve(p: AlignmentLinkage, stack: DirectStack) -> cq.Solid:
     with building(JOURNAL_SLEEVE, "sleeve", "bore_mm", f"{stack.bearing.bore_mm:g}") as checked:
         body: cq.Shape = solids.upright(radius - SLIDES / 2, low, high)
         cuts: list[cq.Shape] = [solids.upright((stack.shaft_diameter + LOOSE) / 2, low - 1.0, high + 1.0)]
-        channel = channel_azimuth(p)
+        channel = p.free_azimuth
         cuts += [solids.radial(GRUB.core / 2, channel + turn, stack.sleeve_grubs, 0.0, radius + 1.0) for turn in GRUBS]
         if stack.ring_length > 0:
             half = max(LEAST_HALF_WIDTH, stack.leads_half_width + BESIDE_LEADS)
