@@ -90,6 +90,15 @@ def test_a_mirrored_plane_is_an_error():
         require_counted(loaded, SETTING * [1, 1, 1, -1], found)
 
 
+def test_few_directions_that_miss_a_blind_spot_are_no_error():
+    """Two blind cones of 2.3 deg, with 0.08 % of the weight; of 100 such mounts one failed after 8 times the count."""
+    lidar = {"sensor": "RPLIDAR A1", "motion": {"period_s": 15.0}}
+    loaded = a_task([{"shape": "all"}])
+    loaded = replace(loaded, task=Task.model_validate(loaded.task.model_dump(exclude_defaults=True) | lidar))
+    setting = np.radians([0.0, 90.0, -1.2, 84.7])
+    require_counted(loaded, setting, score(problem_of(loaded), setting))
+
+
 def half_hidden():
     """A fan of which a quarter never leaves the scanner, and another one at half of the axis angles."""
     bearings = load_task(Path("indoor_urg")).lidar.bearings_rad()
