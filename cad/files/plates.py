@@ -17,6 +17,7 @@ from PIL import ImageDraw, ImageFont
 
 from scanwright.cad.files.manual.pictures import Piece, painted, png_bytes
 from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.print_pose import PRINT_DECIMALS
 from scanwright.design.scene.parallel_view import view_of
 from scanwright.design.scene.ray_caster import build_scene
 
@@ -83,7 +84,8 @@ def threemf_bytes(meshes: Mapping[str, TriMesh], title: str, description: str, s
 def _object(number: int, part: str, mesh: TriMesh) -> Iterator[str]:
     yield f'<object id="{number}" type="model" name={quoteattr(part)}>'
     yield from ("<mesh>", "<vertices>")
-    yield from (f'<vertex x="{x:.5f}" y="{y:.5f}" z="{z:.5f}"/>' for x, y, z in mesh.vertices.tolist())
+    d = PRINT_DECIMALS
+    yield from (f'<vertex x="{x:.{d}f}" y="{y:.{d}f}" z="{z:.{d}f}"/>' for x, y, z in mesh.vertices.tolist())
     yield from ("</vertices>", "<triangles>")
     yield from (f'<triangle v1="{a}" v2="{b}" v3="{c}"/>' for a, b, c in mesh.faces.tolist())
     yield from ("</triangles>", "</mesh>", "</object>")
@@ -150,7 +152,8 @@ def _laid(
         for name in names:
             vertices = printed[name].vertices
             corner = np.array([x, y, 0.0]) - [*vertices.min(axis=0)[:2], 0.0]
-            plate[name] = TriMesh(np.round(vertices + corner, 5) + 0.0, printed[name].faces)
+            moved = vertices + np.round(corner, PRINT_DECIMALS)  # equal steps: no two vertices become one
+            plate[name] = TriMesh(np.round(moved, PRINT_DECIMALS) + 0.0, printed[name].faces)
             x += float(sizes[name][0]) + GAP_MM
         y += depth + GAP_MM
     return plate

@@ -64,9 +64,9 @@ def of_manifold(solid: manifold3d.Manifold) -> TriMesh:
     return TriMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64))
 
 
-def canonical(mesh: TriMesh) -> TriMesh:
+def canonical(mesh: TriMesh, decimals: int = DECIMALS) -> TriMesh:
     """Return the mesh with rounded, merged and sorted vertices and faces."""
-    raw = np.round(mesh.vertices, DECIMALS) + 0.0  # no -0.0
+    raw = np.round(mesh.vertices, decimals) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]
     a, b, c = faces.T

@@ -13,13 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from scanwright.cad.geometry.mesh import TriMesh
+from scanwright.cad.geometry.mesh import TriMesh, canonical
 from scanwright.design.arrays import Array
 from scanwright.design.frames import rigid
 
 OVERHANG_RAD = math.radians(45.0)
 CONTACT_SHARE = 0.25  # of the largest flat on the hull: smaller ones adhere badly
 FLAT = 1e-3  # mm, within which points count as one plane
+PRINT_DECIMALS = 5  # of a coordinate [mm] in a print file
 SUPPORT_STEP_MM3 = 1000.0  # poses closer than this print alike
 
 
@@ -48,10 +49,10 @@ def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
 
 
 def on_bed(mesh: TriMesh, pose: PrintPose) -> TriMesh:
-    """Return the mesh in the frame of the bed, rounded as every mesh."""
-    vertices = np.round(mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3], 5)
+    """Return the mesh in the frame of the bed, rounded as print files write it; no two vertices are at one place."""
+    vertices = mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3]
     vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
-    return TriMesh(vertices + 0.0, mesh.faces)
+    return canonical(TriMesh(vertices, mesh.faces), PRINT_DECIMALS)
 
 
 @dataclass(frozen=True, slots=True)

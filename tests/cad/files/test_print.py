@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.cad.slicer import PROGRAM, sliced
 from scanwright.cad.assembly.print_settings import print_words, slicer_settings
-from scanwright.cad.files.plates import threemf_bytes
+from scanwright.cad.files.plates import plates_of, threemf_bytes
 from scanwright.cad.geometry.mesh import TriMesh
 from scanwright.cad.geometry.print_pose import on_bed, print_pose
 from scanwright.cad.labels.lettering import GLYPHS, text_width
@@ -56,6 +56,30 @@ def test_a_table_is_printed_upside_down_whichever_way_it_was_modelled(quaternion
     lying = on_bed(turned(TABLE, quaternion, shift), pose)
     np.testing.assert_allclose(lying.vertices.min(axis=0), (90, 90, 0), atol=1e-3)
     assert lying.volume() == pytest.approx(TABLE.volume, rel=1e-5)  # turned, not mirrored
+
+
+def split_near_a_corner(triangles, k, gap):
+    """Return a closed mesh with a further vertex on the first edge of triangle k, close to the first end of the edge."""
+    a, b, c = triangles.faces[k]
+    (i,) = (i for i, face in enumerate(triangles.faces) if {a, b} < set(face) and c not in face)
+    (d,) = set(triangles.faces[i]) - {a, b}
+    at, m = triangles.vertices, len(triangles.vertices)
+    middle = at[a] + gap * (at[b] - at[a]) / np.linalg.norm(at[b] - at[a])
+    halves = [(a, m, c), (m, b, c), (b, m, d), (m, a, d)]
+    return TriMesh(np.vstack([at, middle]), np.vstack([np.delete(triangles.faces, [k, i], axis=0), halves]))
+
+
+@given(quaternions, st.integers(0, len(TABLE.faces) - 1), st.floats(-6.5, -4))
+@settings(max_examples=40, deadline=None)
+def test_vertices_that_a_file_rounds_to_one_are_one(quaternion, k, exponent):
+    close = split_near_a_corner(turned(TABLE, quaternion), k, 10**exponent)
+    assert close.is_closed()
+    lying = on_bed(close, print_pose(close, BED))
+    (again,) = plates_of({"a": lying}, BED)[0].values()
+    for each in (lying, again):
+        assert each.is_closed()
+        assert len(np.unique(np.round(each.vertices, 5), axis=0)) == len(each.vertices)
+        assert each.volume() == pytest.approx(TABLE.volume, rel=1e-5)
 
 
 @pytest.mark.parametrize(
