@@ -59,7 +59,7 @@ def test_a_table_is_printed_upside_down_whichever_way_it_was_modelled(quaternion
 
 
 def split_near_a_corner(triangles, k, gap):
-    """Return a closed mesh with a further vertex on the first edge of triangle k, close to the first end of the edge."""
+    """Return a closed mesh with one more vertex on the first edge of triangle k, near its first end."""
     a, b, c = triangles.faces[k]
     (i,) = (i for i, face in enumerate(triangles.faces) if {a, b} < set(face) and c not in face)
     (d,) = set(triangles.faces[i]) - {a, b}
