@@ -27,6 +27,7 @@ SAMPLE = 1.5  # mm between the points of a lead
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
+MORE = (0.5, 6.0, 12.0)  # than a joint and the arc of a right angle: such a piece if no other has place for the joint
 LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.9 g/m each, in a bundle of 3.5 mm
 BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, and it widens
 JOINT_LENGTH = 12.0  # crimps side by side, and a shrink tube over them
@@ -271,6 +272,9 @@ def _laid(
             starts = [_from_hub(start, hub, half, tie) for start in clear]
             lattice = lattice_about_axis(space.floor, half, hub, [*starts, outlet])
             path = short_path(within, starts, [outlet], half, bundle.radius, lattice)
+            if path is not None and not any(_places(piece) for piece in straights(path)):
+                longer = replace(outlet, lengths=tuple(JOINT_LENGTH + bundle.radius + more for more in MORE))
+                path = short_path(within, starts, [longer], half, bundle.radius, lattice) or path
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, bundle.radius, path)

@@ -33,10 +33,14 @@ SETTINGS = {  # servo on the axis, upright and lying lidar; with a bearing; a ho
     "belt": ((0, 19, 84, 41), "URG-04LX", CAPSULE),
     "joints": ((-161.07, -30.61, -17.79, -26.82), "UTM-30LX", BORE),  # the longest straight piece lies in the hub
 }
+NO_PLACE_ON_THE_SHORTEST = {
+    "S2": ((-89.16, -31.66, 19.63, -39.98), "RPLIDAR S2", "UH1256-02-0610-06S"),
+    "TiM551": ((-71.37, -41.04, -16.88, -33.87), "TiM551", "UH1256-02-0610-06S"),
+}
 
 
 def scanner_of_setting(setting):
-    (alpha_rot, beta_rot, alpha, beta), lidar, ring = SETTINGS[setting]
+    (alpha_rot, beta_rot, alpha, beta), lidar, ring = (SETTINGS | NO_PLACE_ON_THE_SHORTEST)[setting]
     angles = AngleSet(
         task="test",
         angles_deg=Angles(alpha_rot=alpha_rot, beta_rot=beta_rot, alpha_laser=alpha, beta_laser=beta),
@@ -198,6 +202,11 @@ def test_joints_touch_neither_the_hub_nor_the_other_lead(setting):
             if other is not lead:
                 nearest = np.linalg.norm(points[:, None] - other.path.points(0.5), axis=2).min()
                 assert nearest > thick + other.diameter / 2
+
+
+@pytest.mark.parametrize("setting", NO_PLACE_ON_THE_SHORTEST)
+def test_a_longer_path_is_taken_if_the_shortest_has_no_place_for_the_joint(setting):
+    assert all(lead.joint is not None for lead in layout_for(setting).leads)
 
 
 class Wall:
