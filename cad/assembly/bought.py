@@ -18,7 +18,8 @@ from scanwright.cad.geometry.mesh import CHORD_ANGLE, CHORD_ERROR, mesh_of
 from scanwright.cad.layout import names
 from scanwright.cad.layout.belt.stack import BeltStack, flange_centres
 from scanwright.cad.layout.cables.fixed import FixedCable
-from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL, RotorLead
+from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, TUBE_WALL
+from scanwright.cad.layout.cables.leads import RotorLead
 from scanwright.cad.layout.cables.route import Path
 from scanwright.cad.layout.drive import DriveLayout, Station
 from scanwright.cad.layout.envelope import lidar_thread_mm

@@ -5,7 +5,8 @@ Clearance and hidden beams are checked with all other bodies, since cables are b
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.checks.table import at_least, note, tidy
-from scanwright.cad.layout.cables.leads import JOINT_LENGTH, RotorLead, straights, tied_mm
+from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, straights
+from scanwright.cad.layout.cables.leads import RotorLead, tied_mm
 from scanwright.cad.layout.cables.route import Path
 from scanwright.cad.layout.names import ROTOR_LEAD, ROTOR_LEADS
 from scanwright.cad.layout.tie_seat import TieSeat

@@ -11,8 +11,9 @@ from itertools import product
 
 import numpy as np
 
+from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, TUBE_WALL, LeadJoint, first_with_place, joint_of
 from scanwright.cad.layout.cables.obstacles import Shape, clear_of, farther, shape_of
-from scanwright.cad.layout.cables.route import GAP, CableSpace, Ending, Path, PathPiece, lattice_about_axis, short_path
+from scanwright.cad.layout.cables.route import Ending, Path, lattice_about_axis, short_path
 from scanwright.cad.layout.deck import Deck
 from scanwright.cad.layout.direct.stack import DirectStack
 from scanwright.cad.layout.drive import Bundle
@@ -27,66 +28,9 @@ SAMPLE = 1.5  # mm between the points of a lead
 OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
-MORE = (0.5, 6.0, 12.0)  # than a joint and the arc of a right angle: such a piece if no other has place for the joint
+MORE = (0.5, 6.0, 12.0)  # than a joint, and the arc of a right angle behind it
 LEAD_G_CM3 = 1.5  # calculated: five wires of 1.3 mm over 0.14 mm2 of copper, 2.9 g/m each, in a bundle of 3.5 mm
 BEAM = 3.0 + 1.0  # around the scan plane: the beam is assumed to be 6 mm wide, and it widens
-JOINT_LENGTH = 12.0  # crimps side by side, and a shrink tube over them
-TUBE_WALL = 0.5  # of the shrink tube; a tenth of the gap to other leads remains
-JOINT_STEP = 3.0  # between two tested places, and two points of a joint
-
-
-@dataclass(frozen=True, slots=True)
-class LeadJoint:
-    """The piece of a path with the joint of `JOINT_LENGTH`, and the offset from the middle of the piece."""
-
-    piece: PathPiece
-    off: float
-
-    @property
-    def along(self) -> Array:
-        """Its direction, shape (3,)."""
-        return np.asarray((self.piece.end - self.piece.start) / self.piece.length)
-
-    @property
-    def middle(self) -> Array:
-        """Shape (3,)."""
-        return self.piece.middle + self.off * self.along
-
-    def points(self) -> Array:
-        """Return points from one end to the other, shape (n, 3)."""
-        return np.asarray(
-            self.middle
-            + np.arange(-JOINT_LENGTH / 2, JOINT_LENGTH / 2 + JOINT_STEP / 2, JOINT_STEP)[:, None] * self.along
-        )
-
-
-def joint_of(path: Path, half: float, space: CableSpace, others: Sequence[tuple[Array, float]]) -> LeadJoint | None:
-    """Return the joint of a lead with radius `half`; None if no straight piece is long enough.
-
-    `others` are middles of the other leads, shape (n, 3), and their distance from the middle of the joint.
-    """
-    places = [place for piece in straights(path) for place in _places(piece)]
-    for place in places:
-        points = place.points()
-        if space.free(points, half + TUBE_WALL, GAP - TUBE_WALL).all() and all(
-            farther(points, *other).all() for other in others
-        ):
-            return place
-    return places[0] if places else None  # the check of clearances then fails
-
-
-def straights(path: Path) -> list[PathPiece]:
-    """Return the straight pieces behind the first bend, the longest first."""
-    pieces = path.pieces()
-    bend = next((i for i, piece in enumerate(pieces) if not piece.straight), -1)
-    return sorted((piece for piece in pieces[bend + 1 :] if piece.straight), key=lambda piece: -piece.length)
-
-
-def _places(piece: PathPiece) -> list[LeadJoint]:
-    """Return joints from the middle of a piece to its ends."""
-    most = (piece.length - JOINT_LENGTH) / 2
-    steps = np.linspace(0.0, most, math.ceil(most / JOINT_STEP) + 1).tolist() if most >= 0 else []
-    return [LeadJoint(piece, off) for off in dict.fromkeys(side * step for step in steps for side in (-1.0, 1.0))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,17 +208,17 @@ def _laid(
         bundle, path, half = bundles[i], None, bundles[i].half
         start = outlet_mm(place, outlets[i], place.scanner.lidar.cable_straight_mm)
         outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
+        long = tuple(half + JOINT_LENGTH + bundle.radius + more for more in MORE)
+        long_outlet = replace(outlet, lengths=long)
         exits = place.drive.lead_exits(bundle, linkage.hub_tie, linkage.free_azimuth)
         # tied if possible; a path in the fan, where its shadow counts, is better than none
         for within, (tie, ends) in product((space, replace(space, bearings_rad=None)), exits):
-            starts = [Ending(np.array(corners), out, OUT, bundle.radius, 0.0) for corners, out in ends]
+            starts = [Ending(np.array(corners), along, OUT, bundle.radius, 0.0) for corners, along in ends]
             clear = [start for start in starts if space.clear_of_others(start.corners).all()]
-            starts = [_from_hub(start, hub, half, tie) for start in clear]
-            lattice = lattice_about_axis(space.floor, half, hub, [*starts, outlet])
-            path = short_path(within, starts, [outlet], half, bundle.radius, lattice)
-            if path is not None and not any(_places(piece) for piece in straights(path)):
-                longer = replace(outlet, lengths=tuple(JOINT_LENGTH + bundle.radius + more for more in MORE))
-                path = short_path(within, starts, [longer], half, bundle.radius, lattice) or path
+            path = first_with_place(
+                _path(within, [_from_hub(start, hub, half, tie, out) for start in clear], behind, bundle, hub)
+                for out, behind in ((OUT, outlet), (OUT, long_outlet), (long, outlet))
+            )
             if path is not None:
                 break
         leads[i] = RotorLead(outlets[i], 2 * half, bundle.radius, path)
@@ -284,6 +228,11 @@ def _laid(
     return tuple(leads[i] for i in sorted(leads))
 
 
+def _path(space: RotorSpace, starts: Sequence[Ending], outlet: Ending, bundle: Bundle, hub: float) -> Path | None:
+    lattice = lattice_about_axis(space.floor, bundle.half, hub, [*starts, outlet])
+    return short_path(space, starts, [outlet], bundle.half, bundle.radius, lattice)
+
+
 def outlet_mm(place: Placement, y: float, out: float) -> Array:
     """Return a point at a distance behind the lidar on the axis of the cable at a y, shape (3,)."""
     lidar, T = place.scanner.lidar, place.scanner.angles.T_rot_laser()
@@ -291,10 +240,10 @@ def outlet_mm(place: Placement, y: float, out: float) -> Array:
     return np.asarray(place.stack.R() @ at + T[:3, 3] * 1000)
 
 
-def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None) -> Ending:
-    """Return the end with its lengths counted from the hub's rim; straight below a slotted tab."""
+def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None, out: Iterable[float]) -> Ending:
+    """Return the end with its lengths `out` counted from the hub's rim; straight below a slotted tab."""
     inside = hub - float(np.hypot(*start.corners[-1, :2]))
-    start = replace(start, lengths=tuple(inside + out for out in OUT), clamped=inside + half + CLAMPED)
+    start = replace(start, lengths=tuple(inside + each for each in out), clamped=inside + half + CLAMPED)
     if seat is None:
         return start
     clamped = start.clamped + seat.end - hub

@@ -11,7 +11,7 @@ from scanwright.cad.assembly.scenes import steps_of
 from scanwright.cad.assembly.shadow import shadow_of, triangles_of
 from scanwright.cad.checks.cables import rotor_cable_checks
 from scanwright.cad.checks.clearance import clearance_checks
-from scanwright.cad.layout.cables.leads import JOINT_LENGTH, TUBE_WALL
+from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, TUBE_WALL
 from scanwright.cad.layout.cables.route import Path
 
 

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 from scanners import avoided
 
-from scanwright.cad.layout.cables.leads import (
-    JOINT_LENGTH,
-    JOINT_STEP,
-    TUBE_WALL,
-    joint_of,
-    leads_of,
-    outlet_mm,
-    rotor_space_of,
-)
+from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, JOINT_STEP, TUBE_WALL, joint_of
+from scanwright.cad.layout.cables.leads import leads_of, outlet_mm, rotor_space_of
 from scanwright.cad.layout.cables.route import Ending, Path, short_path
 from scanwright.cad.layout.direct.cage import BearingCage
 from scanwright.cad.layout.direct.stack import CAGE_SEAT_WALL
