@@ -208,8 +208,10 @@ def _laid(
         bundle, path, half = bundles[i], None, bundles[i].half
         start = outlet_mm(place, outlets[i], place.scanner.lidar.cable_straight_mm)
         outlet = Ending(start[None], -place.stack.R()[:, 0], BACK, 0.0, half + CLAMPED)
-        long = tuple(half + JOINT_LENGTH + bundle.radius + more for more in MORE)
-        long_outlet = replace(outlet, lengths=long)
+        long = tuple(JOINT_LENGTH + bundle.radius + more for more in MORE)
+        ways = [(OUT, outlet), *((OUT, replace(outlet, lengths=(each,))) for each in long)]
+        if len(bundles) == 1:  # several leave the hub side by side, without place between them
+            ways.append((tuple(half + each for each in long), outlet))
         exits = place.drive.lead_exits(bundle, linkage.hub_tie, linkage.free_azimuth)
         # tied if possible; a path in the fan, where its shadow counts, is better than none
         for within, (tie, ends) in product((space, replace(space, bearings_rad=None)), exits):
@@ -217,7 +219,7 @@ def _laid(
             clear = [start for start in starts if space.clear_of_others(start.corners).all()]
             path = first_with_place(
                 _path(within, [_from_hub(start, hub, half, tie, out) for start in clear], behind, bundle, hub)
-                for out, behind in ((OUT, outlet), (OUT, long_outlet), (long, outlet))
+                for out, behind in ways
             )
             if path is not None:
                 break
