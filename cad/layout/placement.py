@@ -18,9 +18,7 @@ from scanwright.cad.layout.rotor.linkage import AlignmentLinkage, linkage_body_o
 from scanwright.cad.layout.rotor.ties import hub_tie_of, plate_ties_of
 from scanwright.cad.layout.tightening import HELD_G, LEAST_MARGIN
 from scanwright.design.arrays import Array
-from scanwright.design.catalogue.lidar import Lidar
-from scanwright.design.catalogue.slip_ring import SlipRing
-from scanwright.design.electrics.wiring import circuits_of
+from scanwright.design.electrics.wiring import require_circuits
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 from scanwright.design.scanner import Scanner
@@ -53,7 +51,7 @@ def placement_of(scanner: Scanner) -> Placement:
         BuildError: something has no place, or what holds it is too weak.
     """
     if scanner.slip_ring is not None:
-        _check_circuits(scanner.slip_ring, scanner.lidar)
+        require_circuits(scanner.slip_ring, scanner.lidar)
     cross: CrossScrew | None = CROSS_SCREWS[0]
     while cross is not None:
         place, turns = _placed(scanner, cross)
@@ -95,16 +93,6 @@ def _placed(scanner: Scanner, cross: CrossScrew) -> tuple[Placement, float]:
     )
     imbalance_gmm = 0.0 if isinstance(bar, Counterweight) else float(np.linalg.norm(moment))
     return place, turning_nm(scanner, imbalance_gmm * 1e-6)
-
-
-def _check_circuits(ring: SlipRing, lidar: Lidar) -> None:
-    """Check that each circuit of a ring carries the lidar's largest current."""
-    weak = next((each for each in circuits_of(ring, lidar) if each.amps > each.rated_a), None)
-    if weak is not None:
-        raise BuildError(
-            f"slip_ring {ring.name}: circuits: {lidar.name} draws up to {weak.amps:g} A by {weak.net}, a circuit is "
-            f"rated for {weak.rated_a:g} A; take a ring with stronger circuits, or no ring"
-        )
 
 
 def drive_of(scanner: Scanner, cross: CrossScrew = CROSS_SCREWS[0]) -> DriveLayout:

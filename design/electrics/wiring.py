@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.lidar_cable import Cable, Connector, connector_for
@@ -22,6 +22,7 @@ from scanwright.design.electrics.loads import (
 )
 from scanwright.design.electrics.network import Box, Branch, Circuit, Network, Pin, Wire
 from scanwright.design.electrics.sizing import fuse_for, supply_for, wire_for
+from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding
 from scanwright.design.scanner import Scanner
 
@@ -115,6 +116,25 @@ def circuits_of(ring: SlipRing, lidar: Lidar) -> tuple[Circuit, ...]:
             used[best] = net, amps
             left.remove(best)
     return tuple(Circuit(i + 1, amps, *used.get(i, ("", 0.0))) for i, (amps, _) in enumerate(rated))
+
+
+def require_circuits(ring: SlipRing, lidar: Lidar, others: Iterable[SlipRing] = ()) -> None:
+    """Check that each circuit of a ring carries the lidar's largest current.
+
+    Raises:
+        BuildError: one does not; the message names those of the other rings that do.
+    """
+    weak = _weak_circuit(ring, lidar)
+    if weak is not None:
+        strong = [other.name for other in others if _weak_circuit(other, lidar) is None]
+        raise BuildError(
+            f"slip_ring {ring.name}: circuits: {lidar.name} draws up to {weak.amps:g} A by {weak.net}, a circuit is "
+            f"rated for {weak.rated_a:g} A; take {', '.join(strong) or 'a ring with stronger circuits'}, or no ring"
+        )
+
+
+def _weak_circuit(ring: SlipRing, lidar: Lidar) -> Circuit | None:
+    return next((each for each in circuits_of(ring, lidar) if each.amps > each.rated_a), None)
 
 
 def _boxes(

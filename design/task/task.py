@@ -22,6 +22,7 @@ from scanwright.design.camera import Camera
 from scanwright.design.catalogue.catalogue import Catalogue, load_catalogue
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.servo import Servo
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.deck_holes import DeckHoles
 from scanwright.design.errors import ScanwrightError, TaskError, suggest
 from scanwright.design.files.faults import NAME, Fault, faults_in, format_faults
@@ -175,7 +176,7 @@ class LoadedTask:
             angles_deg=Angles(**dict(zip(NAMES, angles_deg, strict=True))),
             sensor=task.sensor,
             servo=task.servo,
-            slip_ring=None if isinstance(task.motion, Sweep) else task.slip_ring,
+            slip_ring=None if self.ring is None else self.ring.name,
             motion=None if isinstance(task.motion, Shortest) else task.motion,
         )
 
@@ -196,6 +197,12 @@ class LoadedTask:
     def servo(self) -> Servo:
         """The servo of the task."""
         return self.products.get(self.task.servo, Servo)
+
+    @property
+    def ring(self) -> SlipRing | None:
+        """The slip ring of the task; None without one, or for a sweep."""
+        name = None if isinstance(self.task.motion, Sweep) else self.task.slip_ring
+        return None if name is None else self.products.get(name, SlipRing)
 
     def warnings(self) -> list[str]:
         """Return warnings of unread servo angles, and of planes outside the lidar's range."""

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 from scanwright.cad.checks.checks_json import add_check, read_checks
 from scanwright.cad.files.part_files import PartReport, PartsResult, build_parts, write_files
 from scanwright.cad.kernel import require_kernel
+from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.concurrency.processes import Begin, Packed, worker_processes
+from scanwright.design.electrics.wiring import require_circuits
 from scanwright.design.errors import BuildError
 from scanwright.design.findings import Finding, errors_in, sentence
 from scanwright.design.progress import Progress, no_progress
@@ -313,6 +315,8 @@ def _make(requested: LoadedTask, target: Path, progress: Progress) -> Made:
     from scanwright.design.evaluation.expected_cloud import expected_cloud
     from scanwright.design.search.optimum import find_optimum
 
+    if (ring := requested.ring) is not None:  # before the search, which takes longer
+        require_circuits(ring, requested.lidar, (each for each in requested.products if isinstance(each, SlipRing)))
     progress = partial(measured, progress)
     with fresh_folder(target) as work, worker_processes(2, KERNEL) as begin:  # this process does not load the kernel
         optimum = find_optimum(requested, progress)
