@@ -25,7 +25,7 @@ from scanwright.design.arrays import Array, Mask
 from scanwright.design.catalogue.lidar import Lidar
 
 SAMPLE = 1.5  # mm between the points of a lead
-OUT = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
+OUT: tuple[float, ...] = (10.0, 14.0, 20.0, 28.0)  # of the hub, before the first bend
 CLAMPED = 1.0  # beyond the face at its exit, and its own radius
 BACK = (4.0, 5.5, 8.0, 13.0, 20.0, 30.0)  # from the lidar's stub, before the first bend
 MORE = (0.5, 6.0, 12.0)  # than a joint, and the arc of a right angle behind it
