@@ -41,7 +41,8 @@ FRAME_ON_DECK = Step(
     "Frame on the deck",
     "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck "
     "(`template.pdf`). Lay a nut into the slot of each foot, where it cannot turn. "
-    f"{screws(SERVO_FRAME, DECK)} Lead the servo's cable out of a window of the frame. {OTHER_HOLES}",
+    f"{screws(SERVO_FRAME, DECK)} Connect the servo's cable now, and lead it out of a window of the frame. "
+    f"{OTHER_HOLES}",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
 LEADS_TITLE = "Leads between lidar and ring"

@@ -184,7 +184,7 @@ def vibration_check(
     severity: Severity = "ok" if first >= limit else "warning"
     hint = ""
     if first < limit:
-        hint = "print linkage and mount with more infill, or take a lighter lidar or a shorter ring"
+        hint = "print linkage and mount of a stiffer plastic, or take a lighter lidar or a shorter ring"
         message += (
             f"; a beam moves by up to {1000 * amplitude_m(row, scanner):.2g} mm at {AT_M:g} m, if a mirror of "
             f"{MIRROR_SHARE:.0%} of the lidar's mass is balanced to G {1000 * GRADE_M_S:g} (assumed)"

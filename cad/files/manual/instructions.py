@@ -24,8 +24,8 @@ NUTS = (
 )
 LOCKED = (
     "If a screw ends in metal or in a nut, put a small drop of medium threadlocker on its thread; put none on plastic, "
-    "which can crack. Tighten to the torque behind each screw, and once more after a day, since plastic under a head "
-    "creeps. `checks.json` lists the margin of each joint under `retention` and `screw`."
+    "which can crack. Tighten to the torque behind each screw, and once more after a day if a key reaches it, since "
+    "plastic under a head creeps. `checks.json` lists the margin of each joint under `retention` and `screw`."
 )
 LOOK = "Look, then wire"
 HORN_FIELDS = ("horn_circle_mm", "horn_holes", "horn_first_hole_deg", "horn_screw", "horn_thread_depth_mm")

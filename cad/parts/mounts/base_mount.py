@@ -64,6 +64,7 @@ FOOT_RADIUS = 3.0
 SEAT_GAP = 0.2  # the feet carry, not the rails
 
 
+HANGS = "The scanner hangs under its deck: work with the deck upside down, and turn both over at the end. "
 STEPS = {SERVO_CASE: SERVO_STEP, SERVO_FRAME: FRAME_STEP, BEARING_TOWER: TOWER_STEP}
 UNDER_MOUNT_HEAD = 5.0  # of the mount, to its load
 STRUT_BEHIND = 0.3  # of the strut's front behind that of the back plate
@@ -74,11 +75,14 @@ def mount_spec(place: Placement) -> PartSpec | LeftOut:
     if place.deck.flat:
         return LeftOut(BASE_MOUNT, "the axis is upright: the servo is screwed flat to the deck", 1, "parts")
     onto = place.drive.mounted.onto
+    step = STEPS[onto]
+    if place.scanner.angles.T_world_rot(0.0)[2, :3] @ place.deck.normal < 0:
+        step = replace(step, words=HANGS + step.words)
     return PartSpec(
         name=BASE_MOUNT,
         turns=False,
         make=partial(base_mount, place),
-        step=STEPS[onto],
+        step=step,
         shaped_by=OF_SERVO if onto == SERVO_CASE else (),
         angles="rot",
         joints=tuple(_joints(place)),

@@ -32,8 +32,8 @@ RING_STEP = Step(
     "Slip ring",
     "Pass the plugs of the stator's leads down on the side of the index groove, and lower the slip ring over the "
     "shaft, its collar upwards. Clamp its collar to the shaft with the set screws that are in it. Turn the stator "
-    "until its leads hang straight, and hold it by a cable tie in the grooves of the adapter: it can move a "
-    "little, but must not turn.",
+    "until its leads hang straight, and hold it by a cable tie in the grooves of the adapter, its head on an arm: it "
+    "can move a little, but must not turn.",
     "turned by hand, the shaft turns the rotor, not the stator; no lead is pulled",
 )
 OF_RING = ("slip_ring.outer_diameter_mm", "slip_ring.length_mm", "slip_ring.lead_diameter_mm", "slip_ring.plug_mm")
@@ -41,6 +41,7 @@ ARM_GAP = 0.25  # between arm and stator, on the radius
 ARM = 5.0
 ARM_HALF_WIDTH = 10.0
 ARM_CORNERS = (0.0, outlines.NOTCH, outlines.NOTCH, 0.0)  # radii of the one at +x
+TONGUE_HALF_WIDTH, TONGUE_GROOVE = 3.5, 2.5  # of an arm under a cage, from the tie on, and depth of its groove
 UNDER_ROOF = 12.0  # from the arms' ends to the ring's top, under a cage
 PLATE = 6.0
 
@@ -103,11 +104,17 @@ def slip_ring_adapter(stack: DirectStack, ears: Ears, cage: BearingCage | None) 
         body = body.fuse(*arms).cut(solids.upright(inner, stack.ring_bottom - 1.0, high_end + 9.0))
         body = checked(body)
     with building(SLIP_RING_ADAPTER, "tie groove", "outer_diameter_mm", 2 * stack.ring_radius) as checked:
-        tie = (stack.ring_bottom + high_end) / 2
+        tie, depth = (stack.ring_bottom + high_end) / 2, 1.5 if cage is None else TONGUE_GROOVE
+        low = tie - 3.0
         cuts = [
-            solids.box((low, -99.0, tie - 3.0), (high, 99.0, tie + 3.0))
-            for low, high in ((outer - 1.5, outer + 5.0), (-outer - 5.0, 1.5 - outer))
+            solids.box((near, -99.0, low), (far, 99.0, tie + 3.0))
+            for near, far in ((outer - depth, outer + 5.0), (-outer - 5.0, depth - outer))
         ]
+        if cage is not None:  # a tie around the whole width would meet the legs of the cage
+            cuts += [
+                solids.box((-99.0, near, low), (99.0, far, high_end + 1.0))
+                for near, far in ((TONGUE_HALF_WIDTH, 99.0), (-99.0, -TONGUE_HALF_WIDTH))
+            ]
         return checked(body.cut(*cuts).clean())
 
 

@@ -26,6 +26,12 @@ LOOSE = 0.01  # on the shaft, on the diameter: about the middle of H7, as drawn
 GRUB = SCREWS["M3"]
 GRUBS = (math.radians(135.0), math.radians(-135.0))  # from the channel: both push its wall against the shaft
 UNDER_HUB = 0.3  # gap: the end of the shaft carries the hub
+FROM_FLAT = (  # which is at +y; quarters of a turn, anticlockwise from above
+    "on the side of the flat of the shaft",
+    "a quarter turn anticlockwise from the flat of the shaft, seen from above",
+    "opposite the flat of the shaft",
+    "a quarter turn clockwise from the flat of the shaft, seen from above",
+)
 LEAST_HALF_WIDTH, BESIDE_LEADS = 5.0, 0.4  # of the channel, and on either side of the leads in it
 
 
@@ -34,13 +40,13 @@ def sleeve_spec(place: Placement) -> PartSpec | None:
     stack = place.drive.of(DirectStack)
     if stack is None or stack.bearing is None:
         return None
+    channel = place.linkage.free_azimuth  # as that of the hub above it
     leads = (
-        ", its channel on the side of the linkage's channel for the leads; lay the leads of the slip ring's rotor "
-        "into it"
+        f", its channel {FROM_FLAT[round(math.degrees(channel) / 90.0 - 1.0) % 4]}; lay the leads of the slip ring's "
+        "rotor into it"
         if place.scanner.slip_ring
         else ""
     )
-    channel = place.linkage.free_azimuth  # as that of the hub above it
     words = (
         f"Slide the sleeve onto the shaft, its threads downwards{leads}. With its upper end just below the "
         f"flat, its grub screws are over the groove of the shaft. {screws(SERVO_SHAFT)}"

@@ -7,6 +7,7 @@ import cadquery as cq
 import manifold3d
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -125,12 +126,27 @@ def test_seat_and_journal_take_the_bearing(made):
     assert sleeve[0] < low - 0.5 and high < sleeve[1] < high + 0.5
 
 
-def test_the_cage_comes_down_over_ring_and_arms(made):
+def tie_around(stator, adapter):
+    """Return a tight cable tie of 4.8 x 1.3 mm in the grooves of the adapter: where its arms are thinnest."""
+    heights = np.arange(stator.bounds[0, 2] + 0.5, adapter.bounds[1, 2] - 0.5, 0.25)
+    arms = [adapter.section(plane_origin=[0, 0, z], plane_normal=[0, 0, 1]).vertices for z in heights]
+    reach = np.array([np.abs(points[:, 0]).max() for points in arms])
+    groove = np.flatnonzero(reach < reach.max() - 1.0)
+    rings = [stator.section(plane_origin=[0, 0, heights[groove[0]]], plane_normal=[0, 0, 1]).vertices, arms[groove[0]]]
+    inner = shapely.convex_hull(shapely.MultiPoint(np.vstack(rings)[:, :2]))
+    tie = trimesh.creation.extrude_polygon(inner.buffer(1.3).difference(inner), 4.8)
+    tie.apply_translation([0, 0, heights[groove].mean() - 2.4])
+    return body([tie])
+
+
+def test_the_cage_comes_down_over_ring_arms_and_tie(made):
     name, _, _, meshes = made
     inside = [key for key in ("ring_stator", "ring_rotor", "slip_ring_adapter", "cage_base") if key in meshes]
     if name == "no_ring":
         assert inside == ["cage_base"]
     still = body([meshes[key] for key in inside])
+    if name != "no_ring":
+        still = still + tie_around(meshes["ring_stator"], meshes["slip_ring_adapter"])
     for lift in (0.5, 5.0, 20.0, 45.0, 70.0):
         raised = meshes["bearing_cage"].copy()
         raised.apply_translation([0, 0, lift])
