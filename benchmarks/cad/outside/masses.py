@@ -17,6 +17,7 @@ from benchmarks.cad.outside.screws import HEADS_MM, FoundScrew
 # g/cm3: aluminium by EN 573 and makers' sheets, steel, stainless steel, brass
 METALS_G_CM3 = {"7075": 2.81, "6082": 2.70, "6060": 2.70, "2007": 2.85, "stainless": 7.9, "steel": 7.85, "brass": 8.47,
                 "aluminium": 2.70}  # fmt: skip
+LEAD_G_CM3 = 1.5  # of a bundle of 3.5 mm: five wires of 1.3 mm with 0.14 mm2 of copper, the rest insulation and air
 VOLUME_SHARE = 1e-4  # of a solid's volume: what two writers of the same solid may differ by
 CHORD_SHARE, LABEL_SHARE = 2e-3, 0.015  # of a mesh's volume: its chords, and its engraved label
 MASS_SHARE = 0.01
@@ -119,9 +120,11 @@ def measured_moment(
     folder: Path, bodies: Mapping[str, StepBody], turning: set[str], screws: Sequence[FoundScrew],
     printers: Mapping[str, float],
 ) -> Array:  # fmt: skip
-    """Return the moment (x, y) of the made parts and screws that turn about the axis [g mm]; the rest is round."""
+    """Return the moment (x, y) of made parts, screws and leads that turn about the axis [g mm]; the rest is round."""
     rows = {row["part"]: row for row in bill(folder)}
     total = np.zeros(3)
+    for lead in (bodies[name].shape for name in turning if name.startswith("rotor_lead")):
+        total += LEAD_G_CM3 * lead.Volume() / 1e3 * np.array(lead.Center().toTuple())
     for name in turning & set(rows):
         shape = bodies[name].shape
         total += density_g_cm3(rows[name], printers) * shape.Volume() / 1e3 * np.array(shape.Center().toTuple())
