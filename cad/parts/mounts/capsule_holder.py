@@ -47,8 +47,8 @@ def holder_spec(place: Placement) -> PartSpec | None:
     words = (
         "On the bench: put the slip ring, a capsule, through the disc from above, its flange on the disc, its rotor "
         "upwards. "
-        f"{screws(RING_STATOR)} The nuts lie on the flange. Stop before that torque, while the flange still moves; the "
-        f"threadlocker holds the nuts. Cut {tube:.0f} mm of soft tube, {stack.shaft_bore:g} mm outside and "
+        f"{screws(RING_STATOR)} The nuts lie on the flange. Do not reach that torque: the flange must still move by "
+        f"hand; the threadlocker holds the nuts. Cut {tube:.0f} mm of soft tube, {stack.shaft_bore:g} mm outside and "
         f"{stack.rotor.diameter_mm:g} mm inside, and push it over the stub of the rotor until it almost touches the "
         "body."
     )

@@ -26,8 +26,8 @@ from scanwright.design.catalogue.servo import Servo
 AROUND_BOSS = 0.2  # of the horn
 SEATED_ON_RIM = "the hub is on the rim of the cup without a gap, and does not rock when the lidar is pushed sideways"
 LINKAGE_WORDS = (
-    "Lower the hub over the cup onto its rim; the flat of the cup fits in one position only, and the groove of the hub "
-    f"is then above the groove of the cup. {screws(HORN_CUP)}"
+    "Lower the hub over the cup onto its rim; the flat of the cup fits in one position only, with the index groove of "
+    f"the hub above that of the cup. {screws(HORN_CUP)}"
 )
 
 

@@ -25,7 +25,7 @@ WINDOW = 8.0  # diameter
 LINKAGE_WORDS = (
     "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only. "
     f"{screws(MAIN_SHAFT)} Now set the belt: turn the servo to its centre again, then the linkage, and the shaft in "
-    "its loose pulley, until the groove of the hub is over the groove in the edge of the tower's top, and tighten the "
+    "its loose pulley, until the index groove of the hub is over that in the edge of the tower's top, and tighten the "
     "pulley's two grub screws. Both pulleys have the same number of teeth and turn in the same direction, so the "
     "servo's angle is that of the axis."
 )

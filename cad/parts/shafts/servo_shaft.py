@@ -38,9 +38,11 @@ from scanwright.design.catalogue.servo import Servo
 OF_RING = tuple(
     f"slip_ring.{field}" for field in ("bore_mm", "length_mm", "rotor", "lead_diameter_mm", "lead_bend_radius_mm")
 )
+INDEX = 0.6  # depth of the index groove
+INDEX_NOTE = f"Index groove in the edge of the flange, on the side of the flat: V of 90\u00b0, {INDEX:g} deep."
 LINKAGE_ON_SHAFT = (
-    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only, and the groove of "
-    f"the hub is then above the groove of the flange. {screws(SERVO_SHAFT)}"
+    "Lower the hub onto the upper end of the shaft; the flat of the shaft fits in one position only, with the index "
+    f"groove of the hub above that of the flange. {screws(SERVO_SHAFT)}"
 )
 
 
@@ -77,7 +79,7 @@ def servo_shaft_spec(place: Placement) -> PartSpec | None:
         material=TURNED_FROM if stack.bearing is None else ALUMINIUM.name,
         why_metal="its threads hold the hub, and a printed one bends (0.9 deg at 12 mm with the axis horizontal)",
         fits=fits,
-        notes=(*cross_words(stack), *_waist_words(stack)),
+        notes=(INDEX_NOTE, *cross_words(stack), *_waist_words(stack)),
         shaped_by=(*HORN, "servo.horn_diameter_mm", *OF_RING),
         joints=(on_horn(scanner.servo, stack, SERVO_SHAFT),),
         steps={ALIGNMENT_LINKAGE: Step("Linkage on the shaft", LINKAGE_ON_SHAFT, SEATED)},
@@ -101,7 +103,7 @@ def servo_shaft(stack: DirectStack, servo: Servo, printer: Printer) -> cq.Solid:
         hole, boss = passing_hole(SCREWS[servo.horn_screw], printer) / 2, servo.horn_boss_diameter_mm / 2
         cuts = [solids.box((-2 * radius, stack.flat, stack.shoulder), (2 * radius, 2 * radius, stack.spigot_top + 1.0))]
         cuts += [solids.upright(hole, horn - 1.0, flange + 1.0, x, y) for x, y in horn_centres(servo).tolist()]
-        cuts.append(solids.prism(outlines.diamond(0.6, stack.flange_radius), horn - 1.0, flange + 1.0))  # index groove
+        cuts.append(solids.prism(outlines.diamond(INDEX, stack.flange_radius), horn - 1.0, flange + 1.0))
         cuts += cross_holes(stack)
         if boss > 0:
             cuts.append(solids.upright(boss + 0.2, horn - 1.0, horn + servo.horn_boss_height_mm + 0.5))
@@ -149,7 +151,7 @@ def _waist_words(stack: DirectStack) -> tuple[str, ...]:
     in_steel = f"{STEEL.name} \u00d8{STEEL.waist * stack.waist_diameter:.2f}"
     return (
         f"Waist {stack.waist_length:g} long: as drawn in {ALUMINIUM.name}; in {in_steel}. No other metal is flexible "
-        "and strong enough.",
+        "and strong enough. R 0.5 at its lower end.",
         f"Groove {GROOVE_WIDTH:g} wide and {GROOVE_DEPTH:g} deep, its middle {stack.spigot_top - stack.sleeve_grubs:g} "
         "below the end of the spigot, for the points of grub screws.",
         "Flange face square to the spigot and spigot true to it, one setting: 0.02.",

@@ -325,7 +325,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
         "280 mm" in text
         and "2048 of 4096" in text
         and "servo-setup PORT --centre" in text
-        and "groove of the hub is over the groove" in text
+        and "index groove of the hub is over that in the edge" in text
     )
     masses = dict.fromkeys(assembly.made, 1.0)
     rows = {item.part: item for item in items_of(assembly, masses)}
