@@ -153,6 +153,41 @@ def test_the_cage_comes_down_over_ring_arms_and_tie(made):
         assert (still ^ body([raised])).volume() < 0.05, lift
 
 
+FLAT = "the flat of the shaft"
+FROM_FLAT_DEG = {
+    f"on the side of {FLAT}": 0,
+    f"opposite {FLAT}": 180,
+    f"a quarter turn anticlockwise from {FLAT}, seen from above": 90,
+    f"a quarter turn clockwise from {FLAT}, seen from above": -90,
+}
+
+
+def test_the_step_of_the_sleeve_says_where_the_leads_run():
+    told = set()
+    for angles in ((0, 90, -40, 5), (0, 60, -30, -60)):
+        layout = laid_out(scanner_for(*angles))
+        assert layout.stack.bearing is not None
+        (sleeve,) = [part for part in parts_of(layout) if getattr(part, "name", "") == "journal_sleeve"]
+        (place,) = [words for words in FROM_FLAT_DEG if f"its channel {words}; lay" in sleeve.step.words]
+        x, y, _ = np.mean([lead.path.corners[0] for lead in layout.leads if lead.path], axis=0)  # in the channel
+        turned = np.radians(90 + FROM_FLAT_DEG[place])  # the flat is at +y
+        np.testing.assert_allclose(
+            [x, y] / np.hypot(x, y), [np.cos(turned), np.sin(turned)], atol=0.25
+        )  # two leads are side by side
+        told.add(place)
+    assert len(told) == 2
+
+
+@pytest.mark.parametrize("beta_rot", [-150.0, -30.0, 20.0, 90.0, 170.0])
+def test_a_scanner_that_hangs_is_built_with_its_deck_upside_down(beta_rot):
+    layout = laid_out(scanner_for(0, beta_rot, 30, -30))
+    (mount,) = [part for part in parts_of(layout) if getattr(part, "name", "") == "base_mount"]
+    T = layout.scanner.angles.T_world_rot(0.0)
+    rotor_m, deck_m = T[:3, 3], T[:3, :3] @ layout.deck.centre / 1000 + T[:3, 3]
+    hangs = (T[:3, :3] @ layout.scanner.angles.T_rot_laser()[:3, 3] + rotor_m)[2] < deck_m[2]
+    assert ("deck upside down" in mount.step.words) == hangs
+
+
 def test_wires_of_the_ring_pass_the_bearing(made):
     name, _, assembly, meshes = made
     if name == "no_ring":
