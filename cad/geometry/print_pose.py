@@ -49,10 +49,14 @@ def print_pose(mesh: TriMesh, bed_mm: tuple[float, float, float]) -> PrintPose:
 
 
 def on_bed(mesh: TriMesh, pose: PrintPose) -> TriMesh:
-    """Return the mesh in the frame of the bed, rounded as print files write it; no two vertices are at one place."""
+    """Return the mesh in the frame of the bed, rounded as print files write it, with one vertex at each place.
+
+    If that would open the surface, vertices stay apart: a slicer reads triangles by their numbers.
+    """
     vertices = mesh.vertices @ pose.T_bed_part[:3, :3].T + pose.T_bed_part[:3, 3]
     vertices[:, 2] = np.where(np.abs(vertices[:, 2]) < FLAT, 0.0, vertices[:, 2])
-    return canonical(TriMesh(vertices, mesh.faces), PRINT_DECIMALS)
+    merged = canonical(TriMesh(vertices, mesh.faces), PRINT_DECIMALS)
+    return merged if merged.is_closed() else TriMesh(np.round(vertices, PRINT_DECIMALS) + 0.0, mesh.faces)
 
 
 @dataclass(frozen=True, slots=True)
