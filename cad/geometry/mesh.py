@@ -65,7 +65,7 @@ def of_manifold(solid: manifold3d.Manifold) -> TriMesh:
 
 
 def canonical(mesh: TriMesh, decimals: int = DECIMALS) -> TriMesh:
-    """Return the mesh with rounded, merged and sorted vertices and faces, without pairs of faces back to back."""
+    """Return the mesh with rounded, merged and sorted vertices and faces."""
     raw = np.round(mesh.vertices, decimals) + 0.0  # no -0.0
     vertices, index = np.unique(raw, axis=0, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]
@@ -73,8 +73,6 @@ def canonical(mesh: TriMesh, decimals: int = DECIMALS) -> TriMesh:
     faces = faces[(a != b) & (b != c) & (c != a)]
     first = np.argmin(faces, axis=1)
     faces = np.stack([faces[np.arange(len(faces)), (first + k) % 3] for k in range(3)], axis=1)
-    _, which, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
-    faces = faces[count[which.reshape(-1)] != 2]  # two of the same corners: a sliver that merging has folded
     return TriMesh(vertices, faces[np.lexsort(faces.T[::-1])])
 
 

@@ -59,7 +59,7 @@ def test_a_table_is_printed_upside_down_whichever_way_it_was_modelled(quaternion
 
 
 def split_near_a_corner(triangles, k, gap):
-    """Return a closed mesh with one more vertex on the first edge of triangle k, near its first end."""
+    """Return a closed mesh with one more vertex on the first edge of triangle k, near its first end or beyond it."""
     a, b, c = triangles.faces[k]
     (i,) = (i for i, face in enumerate(triangles.faces) if {a, b} < set(face) and c not in face)
     (d,) = set(triangles.faces[i]) - {a, b}
@@ -69,20 +69,22 @@ def split_near_a_corner(triangles, k, gap):
     return TriMesh(np.vstack([at, middle]), np.vstack([np.delete(triangles.faces, [k, i], axis=0), halves]))
 
 
-@given(quaternions, st.lists(st.integers(0, len(TABLE.faces) - 1), min_size=1, max_size=12), st.floats(-6.5, -4))
-@settings(max_examples=40, deadline=None)
-def test_vertices_that_a_file_rounds_to_one_are_one(quaternion, splits, exponent):
-    close = turned(TABLE, quaternion)
-    for k in splits:
-        close = split_near_a_corner(close, k, 10**exponent)
-    assert close.is_closed()
-    lying = on_bed(close, print_pose(close, BED))
-    (again,) = plates_of({"a": lying}, BED)[0].values()
-    for each in (lying, again):
-        assert each.is_closed()
-        if len(splits) == 1:  # more can meet in one corner: then they may stay apart
-            assert len(np.unique(np.round(each.vertices, 5), axis=0)) == len(each.vertices)
-        assert each.volume() == pytest.approx(TABLE.volume, rel=1e-5)
+def test_vertices_that_a_file_rounds_to_one_are_one_unless_that_opens_the_surface():
+    rng, apart = np.random.default_rng(3), 0
+    for splits in (1, 1, 1, 12) * 15:
+        close = turned(TABLE, rng.normal(size=4))
+        for _ in range(splits):  # with many of them, some are beyond the end of a short edge: merging folds the surface
+            close = split_near_a_corner(close, rng.integers(len(close.faces)), 10 ** rng.uniform(-6.5, -4))
+        assert close.is_closed()
+        lying = on_bed(close, print_pose(close, BED))
+        (again,) = plates_of({"a": lying}, BED)[0].values()
+        assert lying.is_closed() and again.is_closed()
+        for each in (lying, again):
+            assert each.volume() == pytest.approx(TABLE.volume, rel=1e-5)
+        merged = [len(np.unique(each.vertices, axis=0)) == len(each.vertices) for each in (lying, again)]
+        assert all(merged) or splits > 1
+        apart += not all(merged)
+    assert apart
 
 
 @pytest.mark.parametrize(
