@@ -7,18 +7,19 @@ last row adds up both and names the rows that have neither.
 import csv
 import io
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
 from scanwright.cad.assembly.scenes import tied_at
-from scanwright.cad.checks.loads.retention import material_of
+from scanwright.cad.checks.access import NO_BLADES
 from scanwright.cad.drawings.files import drawing_number
+from scanwright.cad.files.bom_item import COLUMNS, JOINTS, STEPS, WIRING_TEXT, BomItem
+from scanwright.cad.files.bom_tools import tools_and_consumables
 from scanwright.cad.files.prices import EACH_USD, ESTIMATED, RECENT, UNSURE, year_of
 from scanwright.cad.layout.drive import DriveLayout, products_of
 from scanwright.cad.layout.joints import Joint
-from scanwright.cad.layout.tightening import hold_of
 from scanwright.cad.screws import INSERT_LENGTH
 from scanwright.design.catalogue.lidar import Lidar
 from scanwright.design.catalogue.product_base import Product
@@ -28,41 +29,27 @@ from scanwright.design.catalogue.slip_ring import SlipRing
 from scanwright.design.electrics.wiring import connectors_of, network_of, plug_of, uart_adapter
 from scanwright.design.scanner import Scanner
 
-JOINTS = "joints of the layout"
-STEPS, WIRING_TEXT, CATALOGUE_CABLES = "assembly.md", "wiring.md", "cables of the catalogue"
+CATALOGUE_CABLES = "cables of the catalogue"
 PAPER = "Schubert 2016, section 3.5: two USB connections and a 12 V supply"
 PAPER_V = 12.0  # of its supply
 WASTE = 0.1  # of the plastic of the parts, more for supports and failed prints
 FILAMENT_USD_PER_KG = (15.0, 35.0)
 
 
-@dataclass(frozen=True, slots=True)
-class BomItem:
-    """One row; all fields except `estimate` are columns. Empty texts and None are unknown."""
+def items_of(
+    assembly: Assembly,
+    masses_g: dict[str, float],
+    plates: Sequence[Sequence[str]] = (),
+    blades_mm: Mapping[Joint, int] = NO_BLADES,
+) -> list[BomItem]:
+    """Return all rows, the total last.
 
-    kind: str  # printed, turned, sawn, material, bought, screw, nut, washer, insert, wiring, consumable, tool or total
-    part: str  # name, or type of product
-    number: str = ""  # drawing number of a made part, designation of a standard part
-    quantity: int | None = 1  # pieces
-    supplier: str = ""  # maker
-    supplier_number: str = ""  # order number
-    unit_usd: float | None = None  # price of one
-    total_usd: float | None = None  # price of all
-    low_usd: float | None = None  # least price of all: from the price, or an estimate
-    high_usd: float | None = None  # largest price of all
-    priced: str = ""  # year of the price
-    mass_g: float | None = None  # of one
-    source: str = ""  # of the price, or of the row
-    verified: str = ""  # whether the price is verified; empty if there is none
-    note: str = ""  # for the buyer
-    estimate: str = ""  # name in `prices.EACH_USD`; empty if there is none
-
-
-COLUMNS = [field.name for field in fields(BomItem)][:-1]
-
-
-def items_of(assembly: Assembly, masses_g: dict[str, float], plates: Sequence[Sequence[str]] = ()) -> list[BomItem]:
-    """Return all rows, the total last; `masses_g` are of the made parts, `plates` the parts printed together."""
+    Args:
+        assembly: the scanner.
+        masses_g: of the made parts.
+        plates: the parts printed together.
+        blades_mm: of the joints that need a long key, see `access.blades_mm`.
+    """
     items, scanner, joints = [], assembly.layout.scanner, assembly.layout.joints
     for name in assembly.made:
         part, number = assembly.parts[name], drawing_number(name, assembly)
@@ -78,7 +65,7 @@ def items_of(assembly: Assembly, masses_g: dict[str, float], plates: Sequence[Se
     items += _wiring(scanner)
     items += _ties(assembly)
     items += _electrics(scanner)
-    items += _small_things(assembly)
+    items += tools_and_consumables(assembly, blades_mm)
     items = [_ranged(item) for item in items]
     return [*items, _total(items)]
 
@@ -243,27 +230,6 @@ def _electrics(scanner: Scanner) -> Iterator[BomItem]:
     ]
     for part, number, quantity, note, estimate in rows:
         yield BomItem("wiring", part, number, quantity, source=WIRING_TEXT, note=note, estimate=estimate)
-
-
-def _small_things(assembly: Assembly) -> Iterator[BomItem]:
-    """Yield small things of the parts, consumables, and tools."""
-    joints = assembly.layout.joints
-    rows = dict.fromkeys(row for name in assembly.made for row in assembly.parts[name].rows)
-    needs = [BomItem(row.kind, row.part, source=row.source, note=row.note, estimate=row.estimate) for row in rows]
-    yield from (need for need in needs if need.kind != "tool")
-    ends, drops = "screws that end in metal or nuts", "a few drops"
-    yield BomItem("consumable", "threadlocker, medium strength", source=ends, note=drops, estimate="threadlocker")
-    sizes = ", ".join(sorted({"grub " * (joint.fixing == "grub") + joint.screw.name for joint in joints}))
-    yield BomItem("tool", "hexagon keys", source=JOINTS, note=f"for {sizes}", estimate="hexagon keys")
-    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
-    torques_nm = [hold.torque_nm for hold in holds if hold is not None]
-    torques = f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
-    yield BomItem("tool", f"torque screwdriver{torques}", source=STEPS, estimate="torque screwdriver")
-    yield BomItem("tool", "caliper", source=STEPS, note="for the values to measure", estimate="caliper")
-    yield BomItem("tool", "multimeter", source=WIRING_TEXT, estimate="multimeter")
-    yield from (need for need in needs if need.kind == "tool")
-    if any(joint.inserts for joint in joints):
-        yield BomItem("tool", "soldering iron", source=STEPS, note="for the inserts", estimate="soldering iron")
 
 
 def _ranged(item: BomItem) -> BomItem:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from scanwright.cad.assembly.print_settings import slicer_settings
+from scanwright.cad.checks.access import blades_mm
 from scanwright.cad.checks.products import without_traps
 from scanwright.cad.drawings.files import template_pdf
 from scanwright.cad.files.bom import bom_text, items_of
@@ -52,9 +53,10 @@ def export_scanner(
     files |= scene_files(scanner, assembly, made.meshes, digest)
     progress("writing bom.csv, wiring.svg and assembly.md with its pictures")
     named = [list(plate) for plate in plates]
-    items = items_of(assembly, made.masses_g(), named)
+    blades = blades_mm(assembly)
+    items = items_of(assembly, made.masses_g(), named, blades)
     files["bom.csv"] = bom_text(items).encode("utf-8")
-    files |= step_files(assembly, made.meshes, named)
+    files |= step_files(assembly, made.meshes, named, blades)
     files |= wiring_files(scanner, digest)
     write_files(folder, files)
     return without_traps(scanner.printer, joints), [

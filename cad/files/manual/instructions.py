@@ -1,11 +1,12 @@
 """`assembly.md`: how to assemble one scanner, with its screws and a picture of each step."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
 from scanwright.cad.assembly.scenes import StepScene, scenes_of
+from scanwright.cad.checks.access import NO_BLADES, blade_in_words
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.files.manual.pictures import StepPictures
 from scanwright.cad.geometry.mesh import TriMesh
@@ -35,8 +36,20 @@ THROUGH_RING = "Then join the leads of the lidar to those of the ring's rotor, t
 IN_A_LOOP = "Leave the lidar's cables a loose loop for the entire sweep, then join them to {port} and power."
 
 
-def instructions_text(assembly: Assembly, scenes: Sequence[StepScene], plates: Sequence[Sequence[str]]) -> str:
-    """Return the Markdown file; scenes of `scenes_of`, `plates` are the parts printed together."""
+def instructions_text(
+    assembly: Assembly,
+    scenes: Sequence[StepScene],
+    plates: Sequence[Sequence[str]],
+    blades_mm: Mapping[Joint, int] = NO_BLADES,
+) -> str:
+    """Return the Markdown file.
+
+    Args:
+        assembly: the scanner.
+        scenes: of `scenes_of`.
+        plates: the parts printed together.
+        blades_mm: of the joints that need a long key, see `access.blades_mm`.
+    """
     scanner = assembly.layout.scanner
     joints = [joint for scene in scenes for joint, _ in scene.joints]
     angles = scanner.angles.angles_deg
@@ -70,7 +83,7 @@ def instructions_text(assembly: Assembly, scenes: Sequence[StepScene], plates: S
         lines += [NUTS.format(holders=" and ".join(holders)), ""]
     for number, scene in enumerate(scenes, start=1):
         lines += [f"## {number}. {scene.step.title}", "", f"![{scene.step.title}]({picture_name(number)})", ""]
-        lines += [_words(assembly, scene), ""]
+        lines += [_words(assembly, scene, blades_mm), ""]
         if scene.step.check:
             lines += [f"Before you go on: {scene.step.check}.", ""]
     network = network_of(scanner)
@@ -113,8 +126,8 @@ def picture_name(number: int) -> str:
     return f"assembly/step_{number:02d}.png"
 
 
-def screws_in_words(assembly: Assembly, joint: Joint) -> str:
-    """Return one joint as a sentence, with the torque of its screws."""
+def screws_in_words(assembly: Assembly, joint: Joint, blade_mm: int | None = None) -> str:
+    """Return one joint as a sentence, with the torque of its screws, and the blade of a driver longer than a key."""
     what = f"{joint.count} x {joint.number}{'' if joint.washer_mm is None else ' with washers'}"
     nuts = f"{joint.count} nut{'s' if joint.count > 1 else ''} {joint.screw.name}"
     in_case = " in the slots of the case" if joint.onto == SERVO_CASE else ""
@@ -128,7 +141,8 @@ def screws_in_words(assembly: Assembly, joint: Joint) -> str:
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    return f"{what} {place}{inserts}, {torque_in_words(assembly, joint)}."
+    reach = "" if blade_mm is None else f", with a driver that has {blade_in_words(blade_mm)}"
+    return f"{what} {place}{inserts}, {torque_in_words(assembly, joint)}{reach}."
 
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
@@ -137,22 +151,27 @@ def torque_in_words(assembly: Assembly, joint: Joint) -> str:
     return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
 
 
-def step_files(assembly: Assembly, meshes: dict[str, TriMesh], plates: Sequence[Sequence[str]]) -> dict[str, bytes]:
+def step_files(
+    assembly: Assembly,
+    meshes: dict[str, TriMesh],
+    plates: Sequence[Sequence[str]],
+    blades_mm: Mapping[Joint, int],
+) -> dict[str, bytes]:
     """Return `assembly.md` and the picture of each step; `meshes` of the made parts have their labels."""
     scenes = scenes_of(assembly)
     pictures = StepPictures(assembly.meshes() | meshes, frozenset(assembly.made))
-    files = {"assembly.md": instructions_text(assembly, scenes, plates).encode("utf-8")}
+    files = {"assembly.md": instructions_text(assembly, scenes, plates, blades_mm).encode("utf-8")}
     for number, scene in enumerate(scenes, start=1):
         torques = [torque_in_words(assembly, joint) for joint, _ in scene.joints]
         files[picture_name(number)] = pictures.picture(scene, torques)
     return files
 
 
-def _words(assembly: Assembly, scene: StepScene) -> str:
+def _words(assembly: Assembly, scene: StepScene, blades_mm: Mapping[Joint, int]) -> str:
     """Return the text of a step with its screws in their places."""
     text = scene.step.words
     for joint, mark in scene.joints:
-        screws = f"**{screws_in_words(assembly, joint)}**"
+        screws = f"**{screws_in_words(assembly, joint, blades_mm.get(joint))}**"
         text = text.replace(mark, f"{screws} {mark}", 1) if mark else f"{text} {screws}"
     return " ".join(re.sub(r"\{.*?\}", "", text).split())
 

@@ -12,6 +12,7 @@ from scanners import CAPSULE, RING, ROLLING, TILTED, scanner_at
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours
 from scanwright.cad.assembly.scenes import scenes_of
+from scanwright.cad.checks.access import blades_mm
 from scanwright.cad.files.bom import _wiring, bom_text, items_of
 from scanwright.cad.files.manual.instructions import instructions_text
 from scanwright.cad.files.prices import EACH_USD
@@ -112,6 +113,27 @@ def test_the_tools_are_those_that_the_steps_ask_for(rows, made):
     assert ("heat-set insert" in steps) == ("soldering iron" in tools)
     assert ("spring scale" in steps) == ("spring scale" in tools)
     assert any("crimps" in row["part"] for row in rows)
+
+
+def test_a_driver_longer_than_a_key_is_in_the_steps_and_among_the_tools(made):
+    assembly = made.result.assembly
+    first, *others = (joint for joint in assembly.layout.joints if joint.screw.name == "M3")
+    blades = {first: 80, others[0]: 120, others[1]: 151}
+    text = instructions_text(assembly, scenes_of(assembly), [], blades)
+    assert [text.count(f"with a driver that has a blade of {n} mm or more") for n in (80, 120)] == [1, 1]
+    assert text.count("a driver that has a blade longer than 150 mm") == 1
+    items = items_of(assembly, dict.fromkeys(assembly.made, 1.0), [], blades)
+    assert [item.part for item in items if item.estimate == "long driver"] == [
+        "hexagon driver for M3 with a blade longer than 150 mm"
+    ]
+
+
+def test_the_drivers_of_a_build_are_those_of_its_steps(rows, made):
+    blades = blades_mm(made.result.assembly)
+    steps = (made.folder / "assembly.md").read_text(encoding="utf-8")
+    assert steps.count("with a driver that has a blade") == len(blades)
+    sizes = {row["part"].split()[3] for row in rows if row["part"].startswith("hexagon driver")}
+    assert sizes == {joint.screw.name for joint in blades}
 
 
 def test_a_spare_of_each_fuse_is_counted_and_paid(rows, made):
