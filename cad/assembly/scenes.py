@@ -20,8 +20,10 @@ from scanwright.cad.layout.names import (
     LIDAR_BODY,
     ROTOR_LEADS,
     SERVO,
+    SERVO_CABLE,
     SERVO_CASE,
     SERVO_FRAME,
+    STATOR_LEADS,
 )
 from scanwright.cad.layout.rotor.counterweight import Counterweight
 from scanwright.cad.parts.part_spec import Step
@@ -41,7 +43,8 @@ FRAME_ON_DECK = Step(
     "Frame on the deck",
     "The axis is upright, so no mount is needed: drill the pattern of the frame's feet into the deck "
     "(`template.pdf`). Lay a nut into the slot of each foot, where it cannot turn. "
-    f"{screws(SERVO_FRAME, DECK)} Connect the servo's cable now, and lead it out of a window of the frame. "
+    f"{screws(SERVO_FRAME, DECK)} Connect both cables of the servo now (`wiring.md`, "
+    "Servo on the bench), and lead them out of a window of the frame. "
     f"{OTHER_HOLES}",
     "the horn turns freely, and the frame does not rock on its four feet",
 )
@@ -49,6 +52,7 @@ LEADS_TITLE = "Leads between lidar and ring"
 LEADS_CHECK = "turned by hand through its entire range, no lead touches a fixed part, and none pulls at its ends"
 CABLES_TITLE = "Cables that do not turn"
 CABLES_CHECK = "turned by hand, nothing comes near a cable; a pull on a cable does not reach its plug"
+BUNDLES = {SERVO_CABLE: "The cables for data and power", STATOR_LEADS: "The stator's leads"}  # each drawn as one
 HUB, SHAFT, NECK, COIL, PLATE, FOOT = "hub", "shaft", "neck", "coil", "plate", "foot of the mount"  # tied there
 
 
@@ -126,17 +130,18 @@ def cables_text(layout: Layout) -> str:
     """Return the instructions for the cables that do not turn."""
     lines = []
     for lead in layout.cables:
-        what = f"The {lead.name.replace('_', ' ')} of {lead.device}"
+        what = f"{BUNDLES[lead.name]} of {lead.device}"
         if lead.path is None:
-            lines.append(f"The {lead.name.replace('_', ' ')} has no path: see `lead_bend` in `checks.json`.")
+            lines.append(f"{what}: no path, see `lead_bend` in `checks.json`.")
         elif layout.deck.flat and len(lead.path.corners) == 2:
             x, y, _ = lead.path.corners[0]
-            lines.append(f"{what} leaves into the deck: drill a hole for its plug at ({x:g}, {y:g}) mm from the axis.")
+            lines.append(
+                f"{what} leave into the deck: drill a hole for their plugs at ({x:g}, {y:g}) mm from the axis."
+            )
         else:
             ends = "next to the case" if layout.deck.flat else "over the edge of the mount's foot"
             bent = f"{lead.path.length():.0f} mm to there, with bend radii of {lead.radius:g} mm or more"
-            runs, stops = ("run", "end") if lead.name.endswith("s") else ("runs", "ends")
-            lines.append(f"{what} {runs} as the picture shows and {stops} {ends}: {bent}.")
+            lines.append(f"{what} run as the picture shows and end {ends}: {bent}.")
     if layout.deck.flat:
         lines.append("Tape each cable to the deck where it leaves the case: the tape takes the pull off its plug.")
     else:

@@ -30,7 +30,11 @@ def tools_and_consumables(assembly: Assembly, blades_mm: Mapping[Joint, int]) ->
     for size, blade_mm in sorted(longest.items()):
         driver = f"hexagon driver for {size} with {blade_in_words(blade_mm)}"
         yield BomItem("tool", driver, source=STEPS, note=LONG_DRIVER, estimate="long driver")
-    holds = [hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto))) for joint in joints]
+    holds = [
+        hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto)))
+        for joint in joints
+        if not joint.loose
+    ]
     torques_nm = [hold.torque_nm for hold in holds if hold is not None]
     torques = f", {min(torques_nm):.2g} to {max(torques_nm):.2g} N m" if torques_nm else ""
     yield BomItem("tool", f"torque screwdriver{torques}", source=STEPS, estimate="torque screwdriver")

@@ -67,6 +67,7 @@ class Joint:
     washer_mm: float | None = None  # diameter of the washers under their heads; None without washers
     # from a single screw, or the line of a pair, to the edge over which the part tips; None for others
     heel_mm: float | None = None
+    loose: bool = False  # whether the bodies must still move a little: its screws are not tightened
 
     @property
     def count(self) -> int:

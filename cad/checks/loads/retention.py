@@ -125,10 +125,11 @@ def _margin(assembly: Assembly, joint: Joint, hold: Hold, hanging: frozenset[str
 
 
 def _screws(joint: Joint, hold: Hold, subject: str) -> Finding:
+    tightened = f"tightened with {hold.torque_nm:g} N m ({hold.preload_n:.0f} N)"
     message = (
         f"{joint.part} on {joint.onto}: {joint.count} x {joint.number}: {hold.engaged_mm:.1f} mm of "
-        f"{'thread' if hold.needed_mm else 'nut or insert'} (at least {hold.needed_mm:.1f}), tightened with "
-        f"{hold.torque_nm:g} N m ({hold.preload_n:.0f} N); cause of loosening: {hold.loosens}"
+        f"{'thread' if hold.needed_mm else 'nut or insert'} (at least {hold.needed_mm:.1f}), "
+        f"{'not tightened' if joint.loose else tightened}; cause of loosening: {hold.loosens}"
     )
     engaged = hold.engaged_mm >= hold.needed_mm - ROUNDING_MM
     value, limit = tidy(hold.engaged_mm), tidy(hold.needed_mm)

@@ -147,6 +147,8 @@ def screws_in_words(assembly: Assembly, joint: Joint, blade_mm: int | None = Non
 
 def torque_in_words(assembly: Assembly, joint: Joint) -> str:
     """Return the torque of the screws of a joint."""
+    if joint.loose:
+        return "loose"
     hold = hold_of(joint, material_of(assembly, joint.part), material_of(assembly, joint.onto))
     return "hand-tight" if hold is None else f"{hold.torque_nm:g} N m"
 
@@ -155,7 +157,7 @@ def step_files(
     assembly: Assembly,
     meshes: dict[str, TriMesh],
     plates: Sequence[Sequence[str]],
-    blades_mm: Mapping[Joint, int],
+    blades_mm: Mapping[Joint, int] = NO_BLADES,
 ) -> dict[str, bytes]:
     """Return `assembly.md` and the picture of each step; `meshes` of the made parts have their labels."""
     scenes = scenes_of(assembly)
@@ -163,7 +165,7 @@ def step_files(
     files = {"assembly.md": instructions_text(assembly, scenes, plates, blades_mm).encode("utf-8")}
     for number, scene in enumerate(scenes, start=1):
         torques = [torque_in_words(assembly, joint) for joint, _ in scene.joints]
-        files[picture_name(number)] = pictures.picture(scene, torques)
+        files[picture_name(number)] = pictures.picture(scene, torques, scenes[: number - 1])
     return files
 
 

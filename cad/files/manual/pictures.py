@@ -6,7 +6,7 @@ that shows the heads of the screws best, or that shows most of the cables in pla
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,13 +33,14 @@ BELOW = 0.15  # by which a view from below must be better
 GAP_MM = 12.0  # between new and present bodies
 OUT_MM = 8.0  # of screws and nuts, from their final place
 SIDES = 24
-GREY, MADE, BOUGHT, METAL = (
-    np.array(c, float) for c in ((222, 222, 219), (226, 112, 30), (44, 110, 168), (70, 70, 74))
+GREY, MADE, BOUGHT, METAL, PLACED = (
+    np.array(c, float) for c in ((222, 222, 219), (226, 112, 30), (44, 110, 168), (70, 70, 74), (150, 150, 152))
 )
+WASHER_MM = 0.6  # drawn thickness
 INK, ARROW, LIGHT = (20, 20, 20), (170, 20, 20), (255, 255, 255)
 EDGE = 0.45  # of a body's colour, at its outline
 STEP_M = 0.0015  # between two distances that are an edge
-COLOURS = 48
+COLOURS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,19 +106,22 @@ class StepPictures:
         self._meshes, self._made = meshes, made
         self._scenes: dict[str, Scene] = {}
 
-    def picture(self, scene: StepScene, torques: Sequence[str]) -> bytes:
-        """Return the PNG of one step; `torques` belong to its screws, joint by joint."""
+    def picture(self, scene: StepScene, torques: Sequence[str], before: Sequence[StepScene] = ()) -> bytes:
+        """Return the PNG of one step; `torques` belong to its screws, joint by joint; `before`: the earlier steps."""
         groups = {sign: [name for name in scene.comes if (name in scene.against) == (sign < 0)] for sign in (1.0, -1.0)}
         shifts = {sign: self._lift(scene, names, sign * scene.along) for sign, names in groups.items() if names}
-        pieces = [self._piece(name, np.zeros(3), GREY) for name in scene.there]
+        known = {name for step in before for name in (*step.there, *step.comes)}
+        colours = {name: MADE if name in self._made else BOUGHT for name in (*scene.there, *scene.comes)}
+        pieces = [self._piece(name, np.zeros(3), GREY if name in known else colours[name]) for name in scene.there]
         for sign, shift in shifts.items():
-            pieces += [self._piece(name, shift, MADE if name in self._made else BOUGHT) for name in groups[sign]]
+            pieces += [self._piece(name, shift, colours[name]) for name in groups[sign]]
         moved_by = {name: shifts[sign] for sign, names in groups.items() for name in names}
         placed = [(joint, moved_by.get(joint.part, np.zeros(3))) for joint, _ in scene.joints]
         for joint, moved in placed:
-            pieces += [Piece(build_scene(body), moved, METAL) for body in _screws(joint)]
+            pieces += [Piece(build_scene(body), moved, METAL) for body in _screws(joint, _out(joint))]
             beyond = moved if joint.onto in (DECK, SERVO_CASE) else moved_by.get(joint.onto, np.zeros(3))
-            pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint)]
+            pieces += [Piece(build_scene(body), beyond, METAL) for body in _nuts(joint, OUT_MM)]
+        pieces += _placed(scene, [joint for step in before for joint, _ in step.joints], moved_by)
         corners = np.concatenate([piece.scene.triangles_m.reshape(-1, 3) + piece.moved_m for piece in pieces])
         width, height = SIZE_PX
         yaw, pitch = _side(scene) if np.any(scene.along) else _clearest(scene, corners, pieces)
@@ -176,24 +180,32 @@ def _clearest(scene: StepScene, corners: Array, pieces: Sequence[Piece]) -> tupl
     def seen(yaw: float, pitch: float) -> float:
         view = view_of(corners, SMALL_PX, yaw, pitch, MARGIN, scene.R_rot_picture)
         away = np.stack([view.shown(piece.scene, piece.moved_m).away_m for piece in pieces])
-        new = np.array([piece.colour is not GREY for piece in pieces])
+        new = np.array([piece.colour is not GREY and piece.colour is not PLACED for piece in pieces])
         pixels = np.isfinite(away.min(axis=0)) & new[away.argmin(axis=0)]
         return float(pixels.sum()) * view.pixel_m**2 * (1.0 - BELOW * (pitch < 0))
 
     return max(((yaw, pitch) for pitch in PITCHES_RAD for yaw in YAWS_RAD), key=lambda side: seen(*side))
 
 
-def _screws(joint: Joint) -> list[Array]:
-    """Return triangles of screws before they are put in [m], each of shape (t, 3, 3)."""
+def _placed(scene: StepScene, earlier: Sequence[Joint], moved_by: Mapping[str, Vector]) -> Iterator[Piece]:
+    """Yield the screws and nuts of earlier steps that are on the bodies of a step."""
+    for joint in earlier:
+        if joint.part in moved_by or joint.part in scene.there:
+            moved = moved_by.get(joint.part, np.zeros(3))
+            yield Piece(build_scene(np.concatenate([*_screws(joint, 0.0), *_nuts(joint, 0.0)])), moved, PLACED)
+
+
+def _screws(joint: Joint, out: float) -> list[Array]:
+    """Return triangles of screws [m], each of shape (t, 3, 3), at a distance [mm] before their final place."""
     axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
-    return [_screw(joint, start - _out(joint) * along, along) / 1000 for start, along in axes]
+    return [_screw(joint, start - out * along, along) / 1000 for start, along in axes]
 
 
-def _nuts(joint: Joint) -> list[Array]:
-    """Return triangles of loose nuts off their face [m], each of shape (t, 3, 3)."""
+def _nuts(joint: Joint, out: float) -> list[Array]:
+    """Return triangles of loose nuts [m], each of shape (t, 3, 3), at a distance [mm] from their face."""
     if joint.fixing not in ("nut", "deck"):
         return []
-    size, off = joint.screw, joint.grip_mm + joint.thread_mm + OUT_MM
+    size, off = joint.screw, joint.grip_mm + joint.thread_mm + out
     axes = [(np.array(axis.start), np.array(axis.along)) for axis in joint.axes]
     return [
         rod(start + off * along, along, size.nut_across / math.sqrt(3), size.nut_height, 6) / 1000
@@ -210,7 +222,10 @@ def _screw(joint: Joint, under_head: Vector, along: Vector) -> Array:
     shank = rod(under_head, along, screw.nominal / 2, joint.length_mm, SIDES)
     if joint.fixing == "grub":
         return shank
-    return np.concatenate([shank, rod(under_head, -along, screw.head_diameter / 2, screw.head_height, SIDES)])
+    bodies = [shank, rod(under_head, -along, screw.head_diameter / 2, screw.head_height, SIDES)]
+    if joint.washer_mm is not None:
+        bodies.append(rod(under_head, -along, joint.washer_mm / 2, WASHER_MM, SIDES))
+    return np.concatenate(bodies)
 
 
 def _arrow(pen: ImageDraw.ImageDraw, start: Array, end: Array) -> None:

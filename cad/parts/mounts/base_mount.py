@@ -37,10 +37,12 @@ from scanwright.design.catalogue.products import Printer
 from scanwright.design.errors import BuildError
 from scanwright.design.left_out import LeftOut
 
+CONNECT = "Connect both cables of the servo now (`wiring.md`, Servo on the bench)."
+TIE = "Lay a cable tie into the slots of the foot at the exit of the cables."
 SERVO_STEP = Step(
     "Servo into the mount",
     f"Put the case between the rails of the base mount, plugs towards the channel behind it. {screws(SERVO_CASE)} "
-    "Connect the servo's cable now, and lay a cable tie into the slots of the foot at its exit. "
+    f"{CONNECT} {TIE} "
     f"{screws(DECK)}",
     check="the case does not rock on its four feet, nor the mount on the deck",
     brings=(SERVO,),
@@ -48,13 +50,13 @@ SERVO_STEP = Step(
 TOWER_STEP = Step(
     "Tower on the mount",
     "Put the tower on the rails of the base mount, the stator's leads into the channel behind it. "
-    f"{screws(BEARING_TOWER)} Lay a cable tie into the slots of the foot at the exit of cables. {screws(DECK)}",
+    f"{screws(BEARING_TOWER)} {TIE} {screws(DECK)}",
     check="the tower does not rock on its four feet, nor the mount on the deck, and no lead is pinched",
 )
 FRAME_STEP = Step(
     "Frame on the mount",
     f"Put the frame on the rails of the base mount, a nut into the slot of each of its feet. {screws(SERVO_FRAME)} "
-    f"Connect the servo's cable now, and lay a cable tie into the slots of the foot at its exit. {screws(DECK)}",
+    f"{CONNECT} {TIE} {screws(DECK)}",
     check="the frame does not rock on its four feet, nor the mount on the deck",
 )
 RAIL_HALF = 5.0  # of the mount's rails, at most

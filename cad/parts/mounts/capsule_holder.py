@@ -5,6 +5,7 @@ through its middle, its flange on top, screws from below with nuts on the flange
 from below, and three radial screws hold it. The wide holes of the flange and the soft tube compensate misalignment.
 """
 
+import math
 from functools import partial
 
 import cadquery as cq
@@ -21,7 +22,8 @@ from scanwright.design.catalogue.products import Printer
 
 BODY_GAP = 0.5  # around the capsule's body
 TUBE_INSIDE = 8.5  # of the soft tube in the shaft
-SOFT_TUBE = "a soft tube, {:.0f} mm long, from the shaft's bore to the stub of the capsule's rotor: {:g} x {:g} mm"
+SOFT_TUBE = "soft tube, {} mm inside, {} mm outside, {:.0f} mm long"
+TUBE_FITS = "it grips a stub of {:g} mm and fits into a bore of {:g} mm; a turn of tape if it is loose there"
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
@@ -43,14 +45,14 @@ def holder_spec(place: Placement) -> PartSpec | None:
     axes = placed_axes(upright_axes(flange_centres(stack.flange), stack.disc_top - DISC, 1.0), stack.turn())
     screw, thickness = SCREWS[stack.flange.screw], stack.flange.thickness_mm
     tube = TUBE_INSIDE + stack.capsule_gap
-    soft_tube = SOFT_TUBE.format(tube, stack.shaft_bore, stack.rotor.diameter_mm)
+    inside, outside = (math.ceil(size) - 1 for size in (stack.rotor.diameter_mm, stack.shaft_bore))
+    fits = TUBE_FITS.format(stack.rotor.diameter_mm, stack.shaft_bore)
     words = (
         "On the bench: put the slip ring, a capsule, through the disc from above, its flange on the disc, its rotor "
         "upwards. "
-        f"{screws(RING_STATOR)} The nuts lie on the flange. Do not reach that torque: the flange must still move by "
-        f"hand; the threadlocker holds the nuts. Cut {tube:.0f} mm of soft tube, {stack.shaft_bore:g} mm outside and "
-        f"{stack.rotor.diameter_mm:g} mm inside, and push it over the stub of the rotor until it almost touches the "
-        "body."
+        f"{screws(RING_STATOR)} The nuts lie on the flange. Tighten them only until the flange can just be moved by "
+        f"hand; the threadlocker holds the nuts. Cut {tube:.0f} mm of soft tube, {inside} mm inside and "
+        f"{outside} mm outside, and push it over the stub of the rotor until it almost touches the body: {fits}."
     )
     return PartSpec(
         name=SLIP_RING_ADAPTER,
@@ -58,8 +60,10 @@ def holder_spec(place: Placement) -> PartSpec | None:
         make=partial(capsule_holder, stack, printer),
         step=Step("Capsule on its disc", words, "the capsule moves a little by hand, and its rotor turns freely"),
         shaped_by=("slip_ring.outer_diameter_mm", "slip_ring.flange"),
-        joints=(Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness),),
-        rows=(Row("wiring", "soft tube", soft_tube, RUBBER), CRIMPS),
+        joints=(
+            Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness, loose=True),
+        ),
+        rows=(Row("wiring", "soft tube", SOFT_TUBE.format(inside, outside, tube), RUBBER, fits), CRIMPS),
         steps={RING: RING_STEP},
     )
 

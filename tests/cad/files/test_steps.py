@@ -1,6 +1,7 @@
 """The steps of the assembly: what each one shows, and its picture."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,7 +31,7 @@ def coloured(picture):
     """Pixels of the colours of what comes, without the words and the red of its way."""
     seen = picture[:, : SIZE_PX[0] - WORDS_PX]
     orange = (seen[..., 0] > 1.5 * seen[..., 2]) & (seen[..., 1] > 1.5 * seen[..., 2])
-    return orange | (seen[..., 2] > 1.5 * seen[..., 0])
+    return (orange | (seen[..., 2] > 1.5 * seen[..., 0])) & (seen.max(axis=-1) > 60)  # few colours: black is bluish
 
 
 def test_a_step_shows_what_earlier_ones_left_and_the_last_one_all(scenes, made):
@@ -58,13 +59,33 @@ def test_what_comes_is_coloured_and_stands_where_it_comes_from(scenes, made):
     assembly = made.result.assembly
     pictures = StepPictures(assembly.meshes(), frozenset(assembly.made))
     scene = next(scene for scene in scenes if scene.thing == "ring")
-    picture = pixels(pictures.picture(scene, []))
+    picture = pixels(pictures.picture(scene, [], scenes[: scenes.index(scene)]))
     assert picture.shape == (SIZE_PX[1], SIZE_PX[0], 3)
     rows, _ = np.nonzero(coloured(picture))
     seen = picture[:, : SIZE_PX[0] - WORDS_PX]
     grey = (np.ptp(seen, axis=2) < 12) & (seen.max(axis=2) < 240)
     assert rows.mean() < np.nonzero(grey)[0].mean() - 50  # the ring above the shaft, which is not hidden by it
     assert np.ptp(rows) < SIZE_PX[1] / 2 and len(rows) > 1000
+
+
+def test_what_is_new_is_coloured_and_earlier_screws_stay(scenes, made):
+    assembly = made.result.assembly
+    pictures = StepPictures(assembly.meshes(), frozenset(assembly.made))
+    by_thing = {scene.thing: (scene, scenes[: scenes.index(scene)]) for scene in scenes}
+    seat, before = by_thing["lidar"]
+    known = [*before, replace(seat, comes=(), joints=())]  # as if the linkage had been there before
+    torques = [""] * len(seat.joints)
+    fresh, grey = (coloured(pixels(pictures.picture(seat, torques, steps))) for steps in (before, known))
+    assert fresh.sum() > grey.sum() + 1000
+    ring, before = by_thing["ring"]
+    bare = [replace(step, joints=()) for step in before]
+    held, loose = (pixels(pictures.picture(ring, [], steps)) for steps in (before, bare))
+    assert (np.abs(held - loose).max(axis=-1) > 40).sum() > 100
+    carried, before = by_thing["alignment_linkage"]
+    bare = [replace(step, joints=()) for step in before]
+    torques = [""] * len(carried.joints)
+    held, loose = (pixels(pictures.picture(carried, torques, steps)) for steps in (before, bare))
+    assert (np.abs(held - loose).max(axis=-1) > 40).sum() > 100  # heads behind the seat, raised with it
 
 
 def test_every_step_has_its_picture_in_the_folder_and_the_same_bytes_again(scenes, made):

@@ -333,7 +333,11 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert rows["belt"].supplier_number == "GT2-6, 140 teeth, 280 mm"
     assert rows["counterweight"].kind == "sawn" and "2 threads M4" in rows["counterweight"].note
     assert rows["main_shaft"].kind == "turned" and "main_shaft.step" in rows["main_shaft"].note
-    assert any("soft tube" in part for part in rows)
+    (tube,) = (row for part, row in rows.items() if "soft tube" in part)
+    assert tube.part.startswith("soft tube, 7 mm inside, 12 mm outside, ") and "a stub of 7.8 mm" in tube.note
+    assert "with 3 nuts M5, loose.**" in text and f"{tube.part.split(', ')[-1].split()[0]} mm of soft tube" in text
+    torques = [float(torque) for torque in re.findall(r", ([\d.]+) N m", text)]
+    assert f"torque screwdriver, {min(torques):.2g} to {max(torques):.2g} N m" in rows
     (tie,) = [row for part, row in rows.items() if "cable tie" in part]  # the capsule needs none
     assert (tie.quantity, tie.note.split(";")[0]) == (
         4,
