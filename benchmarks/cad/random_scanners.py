@@ -57,6 +57,14 @@ def _fits(catalogue: Catalogue, lidar: str, servo: str, ring: str | None) -> boo
     return False
 
 
+def scanners(catalogue: Catalogue, seed: int, first: int = 1) -> Iterator[tuple[int, Scanner | None]]:
+    """Yield the number of each combination from one on, and its scanner; None if it cannot be laid out."""
+    every = shuffled(catalogue, np.random.default_rng(seed))
+    for number, products in enumerate(every[first - 1 :], start=first):
+        fits = _fits(catalogue, *products)
+        yield number, random_scanner(catalogue, products, np.random.default_rng((seed, number))) if fits else None
+
+
 def random_scanner(catalogue: Catalogue, products: Products, rng: np.random.Generator) -> Scanner:
     """Return a scanner of these products: a random axis, and a lidar that does not hang upside down over it."""
     lidar, servo, ring = products
@@ -83,6 +91,14 @@ def random_scanner(catalogue: Catalogue, products: Products, rng: np.random.Gene
     return scanner_of(chosen, str(rng.choice(printers)), catalogue, modules=modules)
 
 
+def described(scanner: Scanner) -> str:
+    """Return the products, angles and printer of a scanner."""
+    angles, ring = scanner.angles.angles_deg, scanner.slip_ring
+    at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"
+    products = f"{scanner.lidar.name} {scanner.servo.name} {ring.name if ring else None}"
+    return f"{products} at {at} on {scanner.printer.name}"
+
+
 def silent_faults(scanner: Scanner, assembly: Assembly) -> Iterator[str]:
     """Yield what no check has reported, from solids and records."""
     for name, solid in assembly.made.items():
@@ -96,23 +112,19 @@ def silent_faults(scanner: Scanner, assembly: Assembly) -> Iterator[str]:
 def main(count: int, seed: int = 0, first: int = 1) -> None:
     """Print the lines."""
     catalogue = load_catalogue()
-    every = shuffled(catalogue, np.random.default_rng(seed))
     outcomes, refused, failed = Counter[str](), Counter[str](), Counter[str]()
     last = first - 1
     with contextlib.suppress(KeyboardInterrupt):
-        for number, products in enumerate(every[last : last + count], start=first):
+        for number, scanner in itertools.islice(scanners(catalogue, seed, first), count):
             outcome, line = "not laid out", ""
-            if _fits(catalogue, *products):
-                scanner = random_scanner(catalogue, products, np.random.default_rng((seed, number)))
+            if scanner is not None:
                 outcome, words = _outcome(scanner, refused, failed)
-                angles = scanner.angles.angles_deg
-                at = f"({angles.alpha_rot:g}, {angles.beta_rot:g}, {angles.alpha_laser:g}, {angles.beta_laser:g})"
-                line = f"{' '.join(map(str, products))} at {at} on {scanner.printer.name}: {outcome}: {words}"
+                line = f"{described(scanner)}: {outcome}: {words}"
             outcomes[outcome] += 1
             last = number
             if outcome not in ("passed", "not laid out"):
                 print(f"{number} {line}", flush=True)
-    print(f"combinations {first} to {last} of {len(every)}, seed {seed}: {dict(outcomes)}")
+    print(f"combinations {first} to {last}, seed {seed}: {dict(outcomes)}")
     for title, counts in (("refused", refused), ("failed", failed)):
         for reason, n in counts.most_common():
             print(f"  {title} {n}: {reason}")

@@ -1,5 +1,6 @@
-"""First natural frequency by CalculiX: `python -m benchmarks.cad.vibration OUT...` (build folders).
+"""First natural frequency by CalculiX: `python -m benchmarks.cad.vibration OUT...`, or `--random COUNT SEED`.
 
+OUT are build folders; `--random` makes the first COUNT scanners of `benchmarks.cad.random_scanners`.
 Gmsh meshes linkage, shaft and mount with tetrahedra; lidar, hub's bore, horn and what stands still are rigid bodies.
 The shaft is a body, not a beam, the linkage's mass is where it is, and its screws alone hold the lidar: nothing is
 shared with `cad/statics` but stiffness of horn, cage, belt and bearing seats, masses and materials. One line for each
@@ -8,16 +9,19 @@ folder, exit code 1 if `scanwright check` states a frequency that is off by more
 
 from __future__ import annotations
 
+import contextlib
 import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.cad.elements import CALCULIX, HEAD_MM, Tetrahedra, tetrahedra
+from benchmarks.cad.random_scanners import described, scanners
 from scanwright.cad.assembly.assembly import Assembly, link_bodies
 from scanwright.cad.assembly.make import make_parts
 from scanwright.cad.checks.loads.deflection import ERROR, deflection_checks, mount_checks, row_of_scanner
@@ -32,6 +36,8 @@ from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
 from scanwright.cad.screws import passing_hole
 from scanwright.design.angles import load_angles
 from scanwright.design.arrays import Array, Mask
+from scanwright.design.catalogue.catalogue import load_catalogue
+from scanwright.design.errors import BuildError
 from scanwright.design.scanner import Scanner
 from scanwright.design.task.task import load_task
 
@@ -229,10 +235,29 @@ def _numbers(chosen: Mask, body: Tetrahedra, before: int) -> list[int]:
 def main() -> None:
     """Print the lines."""
     off = False
-    for out in map(Path, sys.argv[1:]):
-        scanner = load_task(out / "task.toml").scanner(load_angles(out / "angles.json"))
-        off |= compared(out.name, scanner, make_parts(scanner))
+    words = sys.argv[1:]
+    for made in _random(*map(int, words[1:])) if words[:1] == ["--random"] else _built(words):
+        off |= compared(*made)
     sys.exit(off)
+
+
+def _built(folders: list[str]) -> Iterator[tuple[str, Scanner, Assembly]]:
+    for out in map(Path, folders):
+        scanner = load_task(out / "task.toml").scanner(load_angles(out / "angles.json"))
+        yield out.name, scanner, make_parts(scanner)
+
+
+def _random(count: int, seed: int) -> Iterator[tuple[str, Scanner, Assembly]]:
+    found = 0
+    for number, scanner in scanners(load_catalogue(), seed):
+        if scanner is None:
+            continue
+        with contextlib.suppress(BuildError):
+            assembly = make_parts(scanner)
+            found += 1
+            yield f"{number} {described(scanner)}", scanner, assembly
+        if found == count:
+            return
 
 
 def compared(name: str, scanner: Scanner, assembly: Assembly) -> bool:

@@ -144,16 +144,21 @@ def mount_sag(
 ) -> tuple[Array, Array, Spring]:
     """Return the deformation of the mount, a mesh in the rotation frame [mm], under its load.
 
-    Rotation [rad] on the finer grid, and its error, rotation frame, shapes (3,); the mount as a spring between deck and
-    servo.
+    Rotation [rad] and its error, rotation frame, shapes (3,); the mount as a spring between deck and servo. Rotation
+    and compliance are those of the finer grid and what is still missing if the error falls linearly with the edge.
 
     Raises:
         RuntimeError: nothing holds the mount.
     """
-    coarse, fine = (
+    (turned, coarse), (finer, fine) = (
         _mount_on_grid(edge, mesh, deck, mounted, carried, modulus_mpa, density_g_cm3) for edge in MOUNT_EDGES
     )
-    return fine[0], (fine[0] - coarse[0]) / (MOUNT_EDGES[0] / MOUNT_EDGES[1] - 1), fine[1]
+    share = 1 / (MOUNT_EDGES[0] / MOUNT_EDGES[1] - 1)
+    more = share * (finer - turned)
+    compliance = fine.compliance + share * (fine.compliance - coarse.compliance)
+    if np.linalg.eigvalsh(compliance)[0] <= 0:  # the coarser grid is much too soft
+        compliance = fine.compliance
+    return finer + more, more, replace(fine, compliance=compliance)
 
 
 def _mount_on_grid(

@@ -133,7 +133,7 @@ def mount_checks(assembly: Assembly, bodies: Mapping[str, Inertial]) -> tuple[li
     except RuntimeError as error:
         message = f"{BASE_MOUNT}: nothing supports its load: no equilibrium by finite elements ({error})"
         return [Finding("mount_lean", "error", BASE_MOUNT, message, None, LEAN_DEG, "deg")], None
-    lean = np.degrees(layout.scanner.angles.T_world_rot(0.0)[:3, :3] @ (turned + more))
+    lean = np.degrees(layout.scanner.angles.T_world_rot(0.0)[:3, :3] @ turned)
     value = round(float(np.linalg.norm(lean)), 6)
     error_deg = max(math.degrees(float(np.linalg.norm(more))), LEAN_ERROR * value)
     severity: Severity = "note" if value + error_deg <= LEAN_DEG else "warning"

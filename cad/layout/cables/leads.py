@@ -249,4 +249,4 @@ def _from_hub(start: Ending, hub: float, half: float, seat: TieSeat | None, out:
     if seat is None:
         return start
     clamped = start.clamped + seat.end - hub
-    return replace(start, clamped=clamped, used=clamped - CLAMPED)
+    return replace(start, clamped=clamped, used=max(start.used, clamped - CLAMPED))  # the bend before it may be longer

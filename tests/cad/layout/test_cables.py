@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scanners import avoided
+from scanners import avoided, scanner_at
 
 from scanwright.cad.layout.cables.lead_joint import JOINT_LENGTH, JOINT_STEP, TUBE_WALL, joint_of
 from scanwright.cad.layout.cables.leads import leads_of, outlet_mm, rotor_space_of
@@ -47,6 +47,15 @@ def scanner_of_setting(setting):
 def layout_for(setting, **of_ring):
     scanner = scanner_of_setting(setting)
     return laid_out(replace(scanner, slip_ring=scanner.slip_ring.model_copy(update=of_ring)))
+
+
+def test_behind_a_short_tab_the_bend_of_the_leads_keeps_its_length():
+    paths = []
+    for laser_deg in [(-54.65, 21.17), *np.random.default_rng(1286).uniform(-89, 89, (3, 2))]:
+        setting = (0, 90, *(float(angle) for angle in laser_deg))
+        scanner = scanner_at(setting, sensor="LD19", servo="XH430-W350", slip_ring=BORE, printer="sla")
+        paths += [lead.path for lead in laid_out(scanner).leads if lead.path is not None]
+    assert len(paths) == 3 and all(path.slack() > -1e-6 for path in paths)
 
 
 def bend_radii(points):
