@@ -53,6 +53,10 @@ LEADS_CHECK = "turned by hand through its entire range, no lead touches a fixed 
 CABLES_TITLE = "Cables that do not turn"
 CABLES_CHECK = "turned by hand, nothing comes near a cable; a pull on a cable does not reach its plug"
 BUNDLES = {SERVO_CABLE: "The cables for data and power", STATOR_LEADS: "The stator's leads"}  # each drawn as one
+PLATE_TIE = (
+    "A cable tie through the two slots of each tab behind the plate, crossed between tab and cable, holds the lidar's "
+    "cable."
+)
 HUB, SHAFT, NECK, COIL, PLATE, FOOT = "hub", "shaft", "neck", "coil", "plate", "foot of the mount"  # tied there
 
 
@@ -108,10 +112,7 @@ def _ties(layout: Layout) -> list[str]:
     elif NECK in places:
         lines.append("A cable tie around bundle and neck takes the pull off the ring.")
     if PLATE in places:
-        lines.append(
-            "Another through the two slots of each tab behind the plate, crossed between tab and cable, holds the "
-            "lidar's cable."
-        )
+        lines.append(PLATE_TIE)
     return lines
 
 

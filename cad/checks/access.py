@@ -158,8 +158,7 @@ def blades_mm(assembly: Assembly) -> dict[Joint, int]:
 
 def blade_in_words(length_mm: int) -> str:
     """Return the length of a blade that `blade_mm` has found."""
-    least = f"of {length_mm} mm or more" if length_mm <= LONGEST_MM else f"longer than {LONGEST_MM} mm"
-    return f"a blade {least}"
+    return f"blade {length_mm} mm" if length_mm <= LONGEST_MM else f"blade over {LONGEST_MM} mm"
 
 
 def blade_mm(joint: Joint, present: Mapping[str, Body], turning: frozenset[str]) -> int:

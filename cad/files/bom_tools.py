@@ -28,7 +28,7 @@ def tools_and_consumables(assembly: Assembly, blades_mm: Mapping[Joint, int]) ->
     for joint, blade_mm in blades_mm.items():
         longest[joint.screw.name] = max(blade_mm, longest.get(joint.screw.name, 0))
     for size, blade_mm in sorted(longest.items()):
-        driver = f"hexagon driver for {size} with {blade_in_words(blade_mm)}"
+        driver = f"hexagon driver for {size} ({blade_in_words(blade_mm)})"
         yield BomItem("tool", driver, source=STEPS, note=LONG_DRIVER, estimate="long driver")
     holds = [
         hold_of(joint, *(material_of(assembly, body) for body in (joint.part, joint.onto)))

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from scanwright.cad.assembly.assembly import Assembly
 from scanwright.cad.assembly.print_settings import hours_in_words, print_hours, print_words
-from scanwright.cad.assembly.scenes import StepScene, scenes_of
+from scanwright.cad.assembly.scenes import PLATE, PLATE_TIE, StepScene, scenes_of, tied_at
 from scanwright.cad.checks.access import NO_BLADES, blade_in_words
 from scanwright.cad.checks.loads.retention import material_of
 from scanwright.cad.files.manual.pictures import StepPictures
@@ -106,7 +106,8 @@ def _joined(assembly: Assembly) -> str:
     laid = leads and all(lead.path is not None for lead in leads)
     words = IN_A_LOOP if scanner.slip_ring is None else TO_COMPUTER if laid else THROUGH_RING
     adapter = uart_adapter(scanner.lidar)
-    return words.format(port=f"the {adapter}" if adapter else "its port of the computer")
+    joined = words.format(port=f"the {adapter}" if adapter else "its port of the computer")
+    return f"{PLATE_TIE} {joined}" if not leads and PLATE in tied_at(assembly.layout) else joined
 
 
 def _plate(number: int, parts: Sequence[str], assembly: Assembly) -> tuple[str, ...]:
@@ -141,7 +142,7 @@ def screws_in_words(assembly: Assembly, joint: Joint, blade_mm: int | None = Non
     inserts = ", in heat-set inserts" if joint.inserts else ""
     if joint.traps and joint.fixing == "grub":
         inserts = f", through {nuts} in its bore"
-    reach = "" if blade_mm is None else f", with a driver that has {blade_in_words(blade_mm)}"
+    reach = "" if blade_mm is None else f", with a long driver ({blade_in_words(blade_mm)})"
     return f"{what} {place}{inserts}, {torque_in_words(assembly, joint)}{reach}."
 
 

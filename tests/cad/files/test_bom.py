@@ -120,18 +120,18 @@ def test_a_driver_longer_than_a_key_is_in_the_steps_and_among_the_tools(made):
     first, *others = (joint for joint in assembly.layout.joints if joint.screw.name == "M3")
     blades = {first: 80, others[0]: 120, others[1]: 151}
     text = instructions_text(assembly, scenes_of(assembly), [], blades)
-    assert [text.count(f"with a driver that has a blade of {n} mm or more") for n in (80, 120)] == [1, 1]
-    assert text.count("a driver that has a blade longer than 150 mm") == 1
+    assert [text.count(f", with a long driver (blade {n} mm).**") for n in (80, 120)] == [1, 1]
+    assert text.count(", with a long driver (blade over 150 mm).**") == 1
     items = items_of(assembly, dict.fromkeys(assembly.made, 1.0), [], blades)
     assert [item.part for item in items if item.estimate == "long driver"] == [
-        "hexagon driver for M3 with a blade longer than 150 mm"
+        "hexagon driver for M3 (blade over 150 mm)"
     ]
 
 
 def test_the_drivers_of_a_build_are_those_of_its_steps(rows, made):
     blades = blades_mm(made.result.assembly)
     steps = (made.folder / "assembly.md").read_text(encoding="utf-8")
-    assert steps.count("with a driver that has a blade") == len(blades)
+    assert steps.count("with a long driver") == len(blades)
     sizes = {row["part"].split()[3] for row in rows if row["part"].startswith("hexagon driver")}
     assert sizes == {joint.screw.name for joint in blades}
 
@@ -271,8 +271,16 @@ def test_what_a_scanner_does_not_have_is_not_listed(upright):
     assert bom_text(items).count("\n") == len(items) + 1
     text = instructions_text(assembly, scenes_of(assembly), [])
     assert "Servo on the deck" in text and "loose loop" in text and "Slip ring" not in text
+    assert not any("cable tie" in item.part for item in items) and "behind the plate" not in text
     seat = next(joint for joint in joints if joint.onto == "lidar_body")
     assert (seat.part, seat.count) == ("sub_plate", 4)
+
+
+def test_a_tie_behind_the_plate_is_named_without_a_ring():
+    assembly = make_parts(scanner_at((0, 0, 0, 0), slip_ring=None, sensor="URG-04LX", servo="AX-12A"))
+    (tie,) = (item for item in items_of(assembly, dict.fromkeys(assembly.made, 1.0)) if "cable tie" in item.part)
+    assert (tie.quantity, tie.note.split(";")[0]) == (1, "1 at the plate")
+    assert "the two slots of each tab behind the plate" in instructions_text(assembly, scenes_of(assembly), [])
 
 
 def test_what_is_not_verified_is_measured_before_anything_is_printed(made):
