@@ -24,7 +24,7 @@ import numpy as np
 
 from scanwright.cad.assembly.assembly import Assembly, link_bodies, rotor_of
 from scanwright.cad.assembly.make import make_parts
-from scanwright.cad.checks.loads.deflection import LEAN_ERROR, LEAST_ERROR, carried
+from scanwright.cad.checks.loads.deflection import LEAN_ERROR, LEAN_LEAST_DEG, LEAST_ERROR, carried
 from scanwright.cad.geometry.inertia import of_solid
 from scanwright.cad.layout.names import ALIGNMENT_LINKAGE, BASE_MOUNT
 from scanwright.cad.parts.mounts.base_mount import FOOT_RADIUS
@@ -207,7 +207,7 @@ def mount_compared(scanner: Scanner, assembly: Assembly, folder: Path) -> Compar
     changes = float(np.linalg.norm(found - stays, axis=1).max())
     load = carried(assembly, bodies)
     own = mount_sag(assembly.mesh(BASE_MOUNT), deck, mounted, load, *material)[0]
-    stated = float(LEAN_ERROR * np.linalg.norm(own))
+    stated = max(float(LEAN_ERROR * np.linalg.norm(own)), math.radians(LEAN_LEAST_DEG))
     return Compared(bend, float(np.linalg.norm(own - stays)), stated, changes, len(body.nodes))
 
 

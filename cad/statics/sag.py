@@ -30,7 +30,7 @@ EDGES = (8.0, 6.0)  # mm, of the cells of the two grids
 PARTS = 6  # cubes along the edge of a cell
 POISSON = 0.35
 STEP = 1.0  # mm, between points of seat, spigot and washers
-MOUNT_EDGES = (12.0, 8.0)  # mm, of the cells of the two grids
+MOUNT_EDGES = (12.0, 6.0)  # mm, of the cells of the two grids
 INSIDE = 0.05  # mm below a face: points on it are in cells of the part
 
 
@@ -145,7 +145,7 @@ def mount_sag(
     """Return the deformation of the mount, a mesh in the rotation frame [mm], under its load.
 
     Rotation [rad] and its error, rotation frame, shapes (3,); the mount as a spring between deck and servo. Rotation
-    and compliance are those of the finer grid and what is still missing if the error falls linearly with the edge.
+    and compliance are those of the finer grid and what is missing if their error falls with the square of the edge.
 
     Raises:
         RuntimeError: nothing holds the mount.
@@ -153,7 +153,7 @@ def mount_sag(
     (turned, coarse), (finer, fine) = (
         _mount_on_grid(edge, mesh, deck, mounted, carried, modulus_mpa, density_g_cm3) for edge in MOUNT_EDGES
     )
-    share = 1 / (MOUNT_EDGES[0] / MOUNT_EDGES[1] - 1)
+    share = 1 / ((MOUNT_EDGES[0] / MOUNT_EDGES[1]) ** 2 - 1)
     more = share * (finer - turned)
     compliance = fine.compliance + share * (fine.compliance - coarse.compliance)
     if np.linalg.eigvalsh(compliance)[0] <= 0:  # the coarser grid is much too soft

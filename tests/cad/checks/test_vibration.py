@@ -15,7 +15,7 @@ from scanwright.cad.layout.direct.loads import shaft_bend
 from scanwright.cad.layout.loads import ShaftBend
 from scanwright.cad.screws import SCREWS
 from scanwright.cad.solids import box
-from scanwright.cad.statics.sag import Carried, mount_sag
+from scanwright.cad.statics.sag import POISSON, Carried, mount_sag
 from scanwright.cad.statics.spring import Spring, mass_matrix, of_shaft, row_of
 
 E_PA, DIAMETER, LENGTH = 70e9, 0.012, 0.1
@@ -66,7 +66,7 @@ def test_a_load_at_rest_moves_what_the_compliance_says_and_at_resonance_the_loss
 
 
 def test_a_printed_post_swings_with_its_own_mass_as_a_beam_does():
-    """A cantilever of mass m with M at its end: k = 3 EI / L^3, and 33/140 of m moves with M (Rayleigh)."""
+    """A cantilever of mass m with M at its end: 1/k = L^3 / 3 EI + 6 L / 5 GA; 33/140 of m moves with M (Rayleigh)."""
     half, high, modulus, density, mass, below = 12.0, 120.0, 2000.0, 12.0, 0.2, 35.0
     deck = SimpleNamespace(
         rotation=lambda: np.eye(3), centre=(0.0, 0.0, -below), deck_holes=((0.0, 0.0),), screw=SCREWS["M2"]
@@ -76,8 +76,9 @@ def test_a_printed_post_swings_with_its_own_mass_as_a_beam_does():
     load = Carried(mass, np.zeros(3), np.array([1.0, 0.0, 0.0]), half, half)
     spring = mount_sag(post, deck, mounted, load, modulus, density)[2]
     own_kg = density * 1e-6 * (2 * half) ** 2 * high
-    stiffness = 3 * modulus * 1e6 * (2 * half / 1000) ** 4 / 12 / (high / 1000) ** 3
-    expected = math.sqrt(stiffness / (mass + 33 / 140 * own_kg)) / (2 * math.pi)
+    wide, long, shear = 2 * half / 1000, high / 1000, modulus * 1e6 / (2 * (1 + POISSON))
+    compliance = long**3 / (3 * modulus * 1e6 * wide**4 / 12) + 6 / 5 * long / (shear * wide**2)
+    expected = 1 / math.sqrt(compliance * (mass + 33 / 140 * own_kg)) / (2 * math.pi)
     assert np.trace(spring.rigid[3:, 3:]) / 3 == pytest.approx(own_kg, rel=1e-3)
     row = row_of([spring], [mass_matrix(ball(mass, (high - below) / 1000))])
     assert row.frequencies_hz()[0] == pytest.approx(expected, rel=0.05)
