@@ -27,6 +27,7 @@ def key_blocked(
 ) -> str | None:
     """Return the body between the key and its screw at every angle of the rotor, None if the key reaches it."""
     flats, length = KEYS_MM[screw.written.size_mm]
+    length = max(length, screw.written.blade_mm)
     head = STEP_MM + (0.0 if screw.written.holds == "grub" else HEADS_MM[screw.written.size_mm][1])
     rim = flats / np.sqrt(3) * ring(screw.along, RIM_RAYS)
     starts = screw.seat - head * screw.along + np.concatenate([np.zeros((1, 3)), rim])

@@ -14,7 +14,8 @@ SCREWS = re.compile(
     r"|through the (?P<foot>foot) into the deck, with .*?"
     r"|through (?P<through>\w+) into (?P<case>\w+), with \d+ nuts? \S+(?: in the slots of the case)?"
     r"|in (?P<grub>\w+), against (?P<against>\w+))"
-    r"(?P<insert>, in heat-set inserts|, through [^,]* in its bore)?, (?:[\d.]+ N m|hand-tight)\.\*\*"
+    r"(?P<insert>, in heat-set inserts|, through [^,]* in its bore)?, (?:[\d.]+ N m|hand-tight|loose)"
+    r"(?:, with a long driver \(blade (?:over )?(?P<blade>\d+) mm\))?\.\*\*"
 )
 SIZE = re.compile(r"ISO (\d+) M([\d.]+) x (\d+)")
 DECK = "deck"
@@ -30,6 +31,7 @@ class WrittenScrews:
         onto: that holds the threads or the nuts.
         holds: `thread`, `insert`, `trap` (a nut in a pocket), `nut` (behind it), or `grub`.
         standard, size_mm, length_mm: of the screw; each screw.
+        blade_mm: of the driver, if a key is too short; else 0.
     """
 
     step: int
@@ -41,6 +43,7 @@ class WrittenScrews:
     size_mm: float
     length_mm: float
     washer: bool
+    blade_mm: float = 0.0
 
     @property
     def words(self) -> str:
@@ -87,7 +90,7 @@ def _step(number: int, title: str, words: str) -> WrittenStep:
         screws.append(
             WrittenScrews(
                 number, part, onto, holds, int(found["count"]), standard, float(diameter), float(length),
-                bool(found["washer"]),
+                bool(found["washer"]), float(found["blade"] or 0.0),
             )
         )  # fmt: skip
     return WrittenStep(title, tuple(screws), tuple(others))
