@@ -148,7 +148,7 @@ class Ending:
     corners: Array  # from the very end on, shape (k, 3); the cable continues along `direction`
     direction: Array  # unit vector, shape (3,)
     lengths: tuple[float, ...]  # to try, of the piece behind the last corner
-    used: float  # tangent length of the arc at the last corner
+    used: float  # start of the piece behind the last corner that no arc may use: an arc there, or a clamp
     clamped: float  # length of that piece that may be near its device
 
     def tips(self) -> Array:

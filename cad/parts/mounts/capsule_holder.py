@@ -24,6 +24,7 @@ BODY_GAP = 0.5  # around the capsule's body
 TUBE_INSIDE = 8.5  # of the soft tube in the shaft
 SOFT_TUBE = "soft tube, {} mm inside, {} mm outside, {:.0f} mm long"
 TUBE_FITS = "it grips a stub of {:g} mm and fits into a bore of {:g} mm; a turn of tape if it is loose there"
+TAPE = Row("consumable", "tape", "adhesive tape", "assembly.md", "for the soft tube")
 RUBBER = "mounting instructions of capsule rings: drive the rotor by rubber tubing"
 
 
@@ -63,7 +64,7 @@ def holder_spec(place: Placement) -> PartSpec | None:
         joints=(
             Joint(SLIP_RING_ADAPTER, RING_STATOR, "nut", screw, axes, grip_mm=DISC, thread_mm=thickness, loose=True),
         ),
-        rows=(Row("wiring", "soft tube", SOFT_TUBE.format(inside, outside, tube), RUBBER, fits), CRIMPS),
+        rows=(Row("wiring", "soft tube", SOFT_TUBE.format(inside, outside, tube), RUBBER, fits), TAPE, CRIMPS),
         steps={RING: RING_STEP},
     )
 

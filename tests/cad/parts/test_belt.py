@@ -335,6 +335,7 @@ def test_every_screw_has_a_step_and_every_bought_thing_a_row(made):
     assert rows["main_shaft"].kind == "turned" and "main_shaft.step" in rows["main_shaft"].note
     (tube,) = (row for part, row in rows.items() if "soft tube" in part)
     assert tube.part.startswith("soft tube, 7 mm inside, 12 mm outside, ") and "a stub of 7.8 mm" in tube.note
+    assert "adhesive tape" in rows and "a turn of tape" in text
     assert "with 3 nuts M5, loose.**" in text and f"{tube.part.split(', ')[-1].split()[0]} mm of soft tube" in text
     torques = [float(torque) for torque in re.findall(r", ([\d.]+) N m", text)]
     assert f"torque screwdriver, {min(torques):.2g} to {max(torques):.2g} N m" in rows
